@@ -1,20 +1,20 @@
 #!/usr/bin/env bash
 # Measures the cost of movements, poses and messages on one core of this machine. Prints a table and
-# writes a CSV file with commit, compiler and processor.
+# writes a CSV file that contains the commit, the compiler and the processor.
 #
-#   tests/bench/run.sh                       # builtin, and the captures of subject 16 if available
+#   tests/bench/run.sh                       # builtin, and the captures of subject 16 if they exist
 #   tests/bench/run.sh LIBRARY.swl ...       # builtin and these libraries
 #   tests/bench/run.sh --min-time 2 --filter synthesize
 #
-# Times of crowds of 100 to 100,000 avatars are also printed as multiples of a floor, which is
-# measured in the same run: the time to read the necessary bytes once, with one multiply-add per
-# float. For observers, the floor is the time to pass their bytes to the operating system. On
-# machines with AVX-512, crowds are measured with AVX2 as well.
+# The script also prints the cost of crowds of 100 to 100,000 avatars as multiples of a floor, which
+# it measures in the same run. The floor of crowds is the time to read their bytes once, with one
+# multiply-add per float. The floor of observers is the time to pass their bytes to the system. On
+# processors with AVX-512, crowds are measured with AVX2 as well.
 #
-#   --out PATH       CSV file (*.csv) or folder to write to (default: build/release/bench)
+#   --out PATH       CSV file that ends in .csv, or a folder (default: build/release/bench)
 #   --min-time S     seconds per benchmark (default: 0.5)
-#   --filter REGEX   run only benchmarks whose names match
-#   --no-build       do not build the programs
+#   --filter REGEX   run only benchmarks whose name matches
+#   --no-build       use existing programs
 set -euo pipefail
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
@@ -70,10 +70,13 @@ load=$(cut -d ' ' -f 1 /proc/loadavg)
 
 raw=$(mktemp)
 trap 'rm -f "$raw"' EXIT
-# Use one core, except for benchmarks of several shards. The load average in the CSV file shows
-# whether other programs were running.
-bench() { "$@" --benchmark_min_time="$min_time" --benchmark_format=json "${libraries[@]}" >>"$raw"; }
-all_names=$("$bin/stridewire-bench" --benchmark_list_tests "${libraries[@]}" | grep -E -- "$filter" || true)
+# Benchmarks use one core, except those of several shards. The CSV contains the load average, which
+# shows whether other programs disturbed the run.
+bench() {
+  "$@" --benchmark_min_time="$min_time" --benchmark_format=json "${libraries[@]}" >>"$raw"
+}
+all_names=$("$bin/stridewire-bench" --benchmark_list_tests "${libraries[@]}" |
+  grep -E -- "$filter" || true)
 one_of() { sed 's/[][\.*^$+?(){}|]/\\&/g' | paste -sd '|'; }
 one_core=$({ grep -v '/shards/' <<<"$all_names" || true; } | one_of)
 several=$({ grep '/shards/' <<<"$all_names" || true; } | one_of)
@@ -81,21 +84,29 @@ several=$({ grep '/shards/' <<<"$all_names" || true; } | one_of)
 [[ -z $one_core ]] || bench taskset -c 0 "$bin/stridewire-bench" --benchmark_filter="^($one_core)\$"
 crowds=$({ grep -E '/crowd/' <<<"$all_names" || true; } | one_of)
 if [[ -n $crowds ]] && grep -q '"instruction_set": "AVX-512"' "$raw"; then
-  bench taskset -c 0 "$bin/stridewire-bench" --instruction-set=AVX2 --benchmark_filter="^($crowds)\$"
+  bench taskset -c 0 "$bin/stridewire-bench" --instruction-set=AVX2 \
+    --benchmark_filter="^($crowds)\$"
 fi
-# Alternate between one shard and two, and take the median of five runs of each, so that other
-# programs affect both equally.
-[[ -z $several ]] || bench "$bin/stridewire-bench" --benchmark_filter="^($several)\$" --benchmark_repetitions=5 \
-  --benchmark_enable_random_interleaving=true --benchmark_report_aggregates_only=true
+# Runs with one and two shards alternate, so that other programs disturb both equally. The result of
+# each is the median of five runs.
+[[ -z $several ]] || bench "$bin/stridewire-bench" --benchmark_filter="^($several)\$" \
+  --benchmark_repetitions=5 --benchmark_enable_random_interleaving=true \
+  --benchmark_report_aggregates_only=true
 
-# Each benchmark is a JSON object with one key per line.
+# Each benchmark is one JSON object with one key per line.
 awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v csv="$csv" '
-  function value(line) { sub(/^[^:]*: */, "", line); sub(/,$/, "", line); gsub(/"/, "", line); return line }
+  function value(line) {
+    sub(/^[^:]*: */, "", line); sub(/,$/, "", line); gsub(/"/, "", line)
+    return line
+  }
   function number(text) { return text == "" ? "" : sprintf("%.6g", text) }
   function quoted(text) { gsub(/"/, "\"\"", text); return "\"" text "\"" }
   BEGIN {
-    print "benchmark,items_per_s,cpu_us,iterations,bytes_per_s,examples,parameters,library_bytes,bytes_per_example,times_floor,instruction_set,commit,compiler,cpu,load_average" > csv
-    printf "%-40s %14s %12s %10s %12s\n", "one core of " cpu, "items/s", "us per item", "MB/s", "times floor"
+    print "benchmark,items_per_s,cpu_us,iterations,bytes_per_s,examples,parameters," \
+          "library_bytes,bytes_per_example,times_floor,instruction_set,commit,compiler,cpu," \
+          "load_average" > csv
+    printf "%-40s %14s %12s %10s %12s\n", \
+           "one core of " cpu, "items/s", "us per item", "MB/s", "times floor"
   }
   /^ *"instruction_set":/ {
     set = value($0)
@@ -110,13 +121,16 @@ awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v
   /^ *\}/ && f["run_type"] == "aggregate" && f["aggregate_name"] != "median" { split("", f) }
   /^ *\}/ && ("name" in f) {
     sub(/_median$/, "", f["name"])
-    if ("error_message" in f) { print f["name"] ": " f["error_message"] > "/dev/stderr"; failed = 1 }
+    if ("error_message" in f) {
+      print f["name"] ": " f["error_message"] > "/dev/stderr"
+      failed = 1
+    }
     name = f["name"]
-    # Benchmarks with manual time measure processor time without that of the readers.
+    # Benchmarks with manual timing report processor time, which excludes the work of readers.
     us = sub(/\/manual_time$/, "", name) ? f["real_time"] : f["cpu_time"]
     items = f["items_per_second"] != "" ? f["items_per_second"] : 1e6 / us
-    # PREFIX/KIND/SIZE is compared with PREFIX/floor/SIZE, which was measured before it with the
-    # same instruction set.
+    # PREFIX/KIND/SIZE is compared with PREFIX/floor/SIZE, which ran before it with the same
+    # instruction set.
     times = ""
     if (match(name, /\/[^\/]+\/[^\/]+$/)) {
       split(substr(name, RSTART + 1), end, "/")
@@ -129,7 +143,8 @@ awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v
           number(f["library_bytes"]) "," number(f["bytes_per_example"]) "," times "," \
           quoted(set) "," quoted(commit) "," quoted(compiler) "," quoted(cpu) "," load > csv
     if (f["library_bytes"] != "") {
-      printf "%-40s %d bytes, %d examples, %.0f bytes an example\n", name, f["library_bytes"], f["examples"], f["bytes_per_example"]
+      printf "%-40s %d bytes, %d examples, %.0f bytes per example\n", \
+             name, f["library_bytes"], f["examples"], f["bytes_per_example"]
     } else {
       printf "%-40s %14.0f %12.4f %10s %12s\n", name, items, 1e6 / items, \
              f["bytes_per_second"] != "" ? sprintf("%.0f", f["bytes_per_second"] / 1e6) : "", times
