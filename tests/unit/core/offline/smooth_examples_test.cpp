@@ -162,22 +162,26 @@ TEST_F(SmoothExamples, MinimizeTheLeaveOneOutError) {
 
 TEST_F(SmoothExamples, LoseIndividualVariationAndKeepParameters) {
   SCOPED_TRACE(seed_);
-  const MotionGroup group = WithVariation(0.05);
-  std::vector<GridExample> examples = Stored(group);
-  ASSERT_TRUE(stridewire::SmoothExamples(group, layout(), skeleton(), examples).has_value());
   const std::vector<GridExample> were = Stored(clean());
+  // The ratio of single draws scatters so much that one in forty exceeds the limit.
+  constexpr int kDraws = 8;
   double before = 0.0;
   double after = 0.0;
-  for (std::size_t e = 0; e < examples.size(); ++e) {
-    for (std::size_t l = 0; l < 2; ++l) {
-      EXPECT_NEAR(examples[e].parameters[l], were[e].parameters[l], 1.1e-4);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const MotionGroup group = WithVariation(0.05);
+    std::vector<GridExample> examples = Stored(group);
+    ASSERT_TRUE(stridewire::SmoothExamples(group, layout(), skeleton(), examples).has_value());
+    for (std::size_t e = 0; e < examples.size(); ++e) {
+      for (std::size_t l = 0; l < 2; ++l) {
+        EXPECT_NEAR(examples[e].parameters[l], were[e].parameters[l], 1.1e-4);
+      }
+      const auto height = [&](const GridExample& example) {
+        return layout().RootOf(example.rows.data()).position_m.y;
+      };
+      before += manner_m_[e] * manner_m_[e];
+      after += std::pow(height(examples[e]) - height(were[e]), 2);
+      EXPECT_TRUE(ValidateKeytimes(examples[e].keytimes_s).has_value());
     }
-    const auto height = [&](const GridExample& example) {
-      return layout().RootOf(example.rows.data()).position_m.y;
-    };
-    before += manner_m_[e] * manner_m_[e];
-    after += std::pow(height(examples[e]) - height(were[e]), 2);
-    EXPECT_TRUE(ValidateKeytimes(examples[e].keytimes_s).has_value());
   }
   EXPECT_LT(after, 0.8 * before);
 }
