@@ -242,7 +242,7 @@ void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes
   World& world = worlds_[found->second];
   const std::uint64_t tick = batch.info.tick;
   if (batch.info.mode != SentMode() || batch.info.joint_count != world.joint_count) {
-    return Invalid(world, tick, "a batch has another mode or number of joints than requested");
+    return Invalid(world, tick, "a batch has an unexpected mode or number of joints");
   }
   if (!AdvanceStream(world, batch)) return;
   if (run_.window.Contains(tick)) counts_.bytes_received += frame_bytes;
@@ -264,7 +264,7 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
     Seen& seen = world.seen[*index];
     if (seen.tick >= tick) {
       Invalid(world, tick,
-              "avatar " + std::to_string(number) + " appeared twice, or its tick is old");
+              "avatar " + std::to_string(number) + " appeared twice in a tick, or the batch is older than the previous one");
       continue;
     }
     if (seen.tick == 0) ++seen_count_;
