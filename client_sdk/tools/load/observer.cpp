@@ -264,7 +264,7 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
     Seen& seen = world.seen[*index];
     if (seen.tick >= tick) {
       Invalid(world, tick,
-              "avatar " + std::to_string(number) + " appeared twice in a tick, or the batch is older than the previous one");
+              "avatar " + std::to_string(number) + " appeared in a batch of this or a later tick");
       continue;
     }
     if (seen.tick == 0) ++seen_count_;
