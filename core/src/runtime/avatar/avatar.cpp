@@ -35,6 +35,9 @@ const MotionLibrary& Avatar::library() const { return simulation_->library(); }
 double Avatar::time_s() const { return simulation_->time_s(); }
 
 struct AvatarCrowd::Scratch {
+  explicit Scratch(std::shared_ptr<const MotionLibrary> of_library)
+      : library(std::move(of_library)), evaluator(*library, 1), plan(*library) {}
+
   std::shared_ptr<const MotionLibrary> library;
   SoaPoseEvaluator evaluator;
   PlanScratch plan;
@@ -43,7 +46,7 @@ struct AvatarCrowd::Scratch {
 };
 
 AvatarCrowd::AvatarCrowd(std::shared_ptr<const MotionLibrary> library)
-    : scratch_(new Scratch{library, SoaPoseEvaluator(*library, 1), PlanScratch(*library), {}}) {}
+    : scratch_(std::make_unique<Scratch>(std::move(library))) {}
 
 AvatarCrowd::~AvatarCrowd() = default;
 AvatarCrowd::AvatarCrowd(AvatarCrowd&&) noexcept = default;
