@@ -264,7 +264,8 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
     Seen& seen = world.seen[*index];
     if (seen.tick >= tick) {
       Invalid(world, tick,
-              "avatar " + std::to_string(number) + " appeared in a batch of this or a later tick");
+              "avatar " + std::to_string(number) + " appeared twice in tick " +
+                  std::to_string(tick) + ", or the tick is old");
       continue;
     }
     if (seen.tick == 0) ++seen_count_;
