@@ -109,7 +109,7 @@ void ExpectAllPoses(const json& report) {
 void ExpectNoErrorsButLateness(const json& report) {
   for (const json& error : report["errors"]) {
     const auto text = error.get<std::string>();
-    EXPECT_TRUE(text.starts_with("this program could not keep up") ||
+    EXPECT_TRUE(text.starts_with("this program was too slow") ||
                 text.starts_with("the server dropped") || text.find("had not moved") != text.npos)
         << text;
   }
