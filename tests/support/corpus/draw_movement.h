@@ -1,0 +1,23 @@
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "corpus/corpus_case.h"
+#include "corpus/figure.h"
+#include "random.h"
+
+namespace stridewire::test {
+
+/// A random motion with its truth.
+struct DrawnMovement {
+  FigureMotion motion;
+  double declared_fps = 30.0;  ///< Differs from motion.fps if the file declares a wrong rate.
+  std::array<int, 2> steps{};
+  int jumps = 0;
+  std::string description;
+};
+
+[[nodiscard]] DrawnMovement DrawMovement(Movement movement, const Figure& figure, Random& random);
+
+}  // namespace stridewire::test
