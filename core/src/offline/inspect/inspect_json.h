@@ -1,0 +1,24 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "offline/inspect/library_summary.h"
+#include "offline/inspect/refusals.h"
+#include "offline/inspect/self_check.h"
+
+namespace stridewire {
+
+/// Returns a summary as {"sentences": [...], "steps": {...}, "starts": {"left": {...}, "right":
+/// {...}}, ..., "missing": [{"what": ..., "advice": ...}]}. Each ability has the numbers of its
+/// captured, mirrored and generated examples, and its range or null.
+[[nodiscard]] nlohmann::ordered_json SummaryToJson(const LibrarySummary& summary);
+
+/// Returns {"passed": ..., "verdict": ..., "checks": [{"name": ..., "verdict": ..., ...}]}.
+[[nodiscard]] nlohmann::ordered_json SelfCheckToJson(const SelfCheck& check);
+
+/// Returns a list of {"request": index in the choreography, "kind": ..., "asked": {...}, "got":
+/// {...}, "missed_m": ..., "missed_rad": ..., "reason": ...}.
+[[nodiscard]] nlohmann::ordered_json RefusalsToJson(const std::vector<Refusal>& refusals);
+
+}  // namespace stridewire

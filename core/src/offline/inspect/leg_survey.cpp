@@ -1,0 +1,92 @@
+#include "offline/inspect/leg_survey.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "offline/inspect/degrees.h"
+#include "runtime/skeleton/leg_rig.h"
+
+namespace stridewire {
+namespace {
+
+// A leg is bent if its knee is further off the line from hip to ankle than this fraction of the
+// thigh, which corresponds to about 20 degrees.
+constexpr float kBent = 0.17f;
+// A foot that points along the line from hip to ankle has no direction.
+constexpr float kLeastFootPart = 0.5f;
+
+// Returns the angle between the bend of a knee and the foot, or nothing if one has no direction.
+std::optional<double> KneeDegrees(const LegRig::Side& side, const LegPose& leg) {
+  const Vec3& hip = leg.positions_m[static_cast<std::size_t>(side.hip)];
+  const Vec3& knee = leg.positions_m[static_cast<std::size_t>(side.knee)];
+  const Vec3& ankle = leg.positions_m[static_cast<std::size_t>(side.ankle)];
+  const Vec3 line = ankle - hip;
+  const float length = glm::length(line);
+  if (length < 1e-3f) return std::nullopt;
+  const Vec3 along = line / length;
+  const Vec3 bend = knee - hip - glm::dot(knee - hip, along) * along;
+  const Vec3 foot = leg.ball_m - ankle;
+  const Vec3 ahead = foot - glm::dot(foot, along) * along;
+  const float bend_m = glm::length(bend);
+  const float ahead_m = glm::length(ahead);
+  if (bend_m < kBent * side.thigh_m || ahead_m < kLeastFootPart * glm::length(foot)) {
+    return std::nullopt;
+  }
+  const double cosine = static_cast<double>(glm::dot(bend, ahead)) / (bend_m * ahead_m);
+  return kDegreesPerRadian * std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
+// Returns the height of a sole above level ground.
+double SoleHeight(const LegRig::Side& side, const LegPose& leg, double root_y_m, bool has_stand) {
+  const double ball_m = root_y_m + leg.ball_m.y - side.ball_height_m;
+  if (!has_stand) return ball_m;
+  return std::min({ball_m, root_y_m + leg.heel_m.y - side.ball_height_m,
+                   root_y_m + leg.toe_tip_m.y - side.toe_height_m});
+}
+
+// Returns how far a foot hovers during a contact, from the heights of its sole in every frame.
+double HoverOf(const PlantRecord& plant, const std::vector<double>& heights_m, double fps,
+               bool has_stand) {
+  constexpr double kSlack = 1e-6;
+  const auto last_frame = static_cast<int>(heights_m.size()) - 1;
+  const int first = static_cast<int>(std::ceil(plant.from_s * fps - kSlack));
+  const int last = std::min(static_cast<int>(std::floor(plant.to_s * fps + kSlack)), last_frame);
+  if (first > last) return 0.0;
+  const auto [lowest, highest] =
+      std::minmax_element(heights_m.begin() + first, heights_m.begin() + last + 1);
+  return std::max(0.0, has_stand ? *highest : *lowest);
+}
+
+}  // namespace
+
+void SurveyLegs(const MotionLibrary& library, const Synthesis& synthesis, bool has_stand,
+                LegDeviations& deviations) {
+  const LegRig& rig = library.leg_rig();
+  if (!rig.is_usable) return;
+  LegPose leg;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const LegRig::Side& side = rig.side(foot);
+    std::vector<double> heights_m;
+    for (int frame = 0; frame < synthesis.clip.frame_count(); ++frame) {
+      const ConstPoseSpan pose = synthesis.clip.frame(frame);
+      EvaluateLeg(library.skeleton(), rig, pose, foot, leg);
+      if (const auto knee_deg = KneeDegrees(side, leg)) {
+        deviations.knee_deg = std::max(deviations.knee_deg.value_or(0.0), *knee_deg);
+      }
+      heights_m.push_back(
+          SoleHeight(side, leg, static_cast<double>(pose.root_position_m.y), has_stand));
+      deviations.sink_m = std::max(deviations.sink_m, -heights_m.back());
+      ++deviations.feet;
+    }
+    for (const MovementRecord& movement : synthesis.movements) {
+      for (const PlantRecord& plant : movement.plants) {
+        if (plant.foot != foot) continue;
+        deviations.hover_m =
+            std::max(deviations.hover_m, HoverOf(plant, heights_m, synthesis.clip.fps, has_stand));
+      }
+    }
+  }
+}
+
+}  // namespace stridewire

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <optional>
+
+#include "stridewire/offline/synthesis.h"
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+
+/// Largest deviations of the legs over some clips.
+struct LegDeviations {
+  /// Angle between the direction in which a knee bends and the direction of its foot, degrees.
+  /// Empty if no leg is ever bent.
+  std::optional<double> knee_deg;
+  double hover_m = 0.0;  ///< Height of a standing sole above level ground.
+  double sink_m = 0.0;   ///< Depth of any sole below level ground.
+  int feet = 0;          ///< Number of feet measured, one per leg and frame.
+};
+
+/// Measures knees and soles of a synthesis on level ground at y = 0. Extends `deviations`.
+///
+/// - The direction of a knee is that from the line between hip and ankle to the knee. It is
+///   compared with that from ankle to ball, both seen along that line. Legs that are bent by less
+///   than about 20 degrees have no direction.
+/// - Heights are relative to the stand pose. The height of a sole is that of the lowest of heel,
+///   ball and tip of the toes. If `has_stand` is false, the stand pose is a moment in mid-stride,
+///   in which heels and toes are not on the ground. Then only the ball is measured, and a standing
+///   foot counts as hovering only if its ball never comes down while it stands.
+void SurveyLegs(const MotionLibrary& library, const Synthesis& synthesis, bool has_stand,
+                LegDeviations& deviations);
+
+}  // namespace stridewire

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+
+/// Numbers of examples by origin. An averaged example counts once.
+struct ExampleOrigins {
+  int captured = 0;   ///< Cut from a capture.
+  int mirrored = 0;   ///< Mirror image of a captured example.
+  int generated = 0;  ///< Generated without a capture.
+
+  [[nodiscard]] int total() const { return captured + mirrored + generated; }
+};
+
+/// Smallest and largest value; 0 if there is none.
+struct ValueRange {
+  double min = 0.0;
+  double max = 0.0;
+};
+
+/// Movements of one sort that a library contains, and the range that their examples cover.
+struct Ability {
+  ExampleOrigins origins;
+  ValueRange range;  ///< Unit: see LibrarySummary.
+  [[nodiscard]] bool is_available() const { return origins.total() > 0; }
+};
+
+/// Something that a library cannot do.
+struct MissingAbility {
+  std::string what;    ///< What is missing, for example "turns to the right".
+  std::string advice;  ///< Which recording or option adds it, as one sentence.
+};
+
+/// Describes what avatars can do with a library.
+///
+/// Steps are classified by the feet in the first and last pose of each example. An example that is
+/// stored in several groups counts once. Pairs are [Foot]: for starts, stops, strides, backward
+/// steps and heights the moving foot; for turns and side steps the direction.
+struct LibrarySummary {
+  using Sides = std::array<Ability, 2>;
+
+  ExampleOrigins steps;      ///< All steps.
+  Sides starts;              ///< From feet together to feet apart; length in metres.
+  Sides stops;               ///< From feet apart to feet together; previous stride in metres.
+  Sides strides;             ///< Steps forward; distance between the feet at the end, metres.
+  Sides turns;               ///< Steps that turn; degrees, always positive.
+  Sides side_steps;          ///< Steps to the side; sideways movement of the foot in metres.
+  Sides back_steps;          ///< Steps backward; distance between the feet at the end, metres.
+  Sides climbs;              ///< Steps up; height of the moving above the fixed foot, metres.
+  Sides descents;            ///< Steps down; depth of the moving below the fixed foot, metres.
+  ValueRange speed_m_s;      ///< Speed of the body in `strides`.
+  Ability jumps;             ///< Lengths in metres.
+  ValueRange jump_up_m;      ///< Heights of the landing places above the start.
+  ValueRange jump_turn_deg;  ///< Turns of the jumps; positive is left.
+  /// Distance of the feet in the stand pose, in the direction of the heading.
+  double stand_stride_m = 0.0;
+  std::vector<MissingAbility> missing;
+
+  /// Feet are together if they are at most this far apart in the direction of the heading.
+  static constexpr double kTogetherM = 0.12;
+  /// Returns true if the feet of the stand pose are together.
+  [[nodiscard]] bool has_stand() const { return stand_stride_m <= kTogetherM; }
+  [[nodiscard]] bool has_steps_of(Foot foot) const {
+    return feet[static_cast<std::size_t>(foot)] > 0;
+  }
+  std::array<int, 2> feet{};  ///< [Foot]: number of steps of each foot.
+};
+
+/// Summarizes a library. The time is proportional to the number of examples.
+[[nodiscard]] LibrarySummary Summarize(const MotionLibrary& library);
+
+/// Describes the abilities in plain sentences, one per sort of movement. Does not include
+/// `missing`.
+[[nodiscard]] std::vector<std::string> DescribeSummary(const LibrarySummary& summary);
+
+}  // namespace stridewire

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "stridewire/offline/synthesis.h"
+
+namespace stridewire {
+
+/// A request that was not carried out as asked.
+struct Refusal {
+  using Values = std::vector<std::pair<std::string, double>>;
+
+  std::uint64_t request_id = 0;
+  std::string kind;  ///< "step", "jump", "stand" or "walk_to".
+  /// The request and the result as values with units in their names, for example length_m. Both
+  /// contain the same names.
+  Values asked;
+  Values got;
+  double missed_m = 0.0;    ///< Distance between the results asked for and got.
+  double missed_rad = 0.0;  ///< Angle between their directions or headings; the larger one.
+  /// One sentence without its subject, the movement: "did not arrive: ...".
+  std::string reason;
+};
+
+/// Results that differ more from their request than this are listed.
+inline constexpr double kMaxMissM = 0.2;
+inline constexpr double kMaxMissRad = 1.0471975511965976;  ///< 60 degrees.
+
+/// Compares the movements of a synthesis with the requests in `input`. Lists each step, jump and
+/// stand whose result misses the request by more than kMaxMissM or kMaxMissRad, walks that did not
+/// arrive, and skipped steps. Ordered by request.
+///
+/// - Steps: position of the moving foot relative to the fixed foot in the heading after the step,
+///   direction of the path of the moving foot, and change of heading. With `at`, the footprint.
+/// - Jumps: movement of the base frame in the heading at its start, and change of heading.
+/// - Stands: distance of the feet from their relative positions in the stand pose.
+/// - Heights are compared on level ground only; a terrain determines them itself.
+[[nodiscard]] std::vector<Refusal> FindRefusals(const SynthesisInput& input,
+                                                const Synthesis& synthesis);
+
+}  // namespace stridewire

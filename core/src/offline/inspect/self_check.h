@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+
+enum class CheckVerdict : std::uint8_t {
+  kPassed,
+  kFailed,
+  kNotApplicable,  ///< The library has no such movement; `text` says which one.
+};
+
+/// Returns "passed", "failed" or "not_applicable".
+[[nodiscard]] std::string_view CheckVerdictName(CheckVerdict verdict);
+
+/// The result of one check.
+struct CheckResult {
+  std::string name;   ///< For programs, for example "three_steps".
+  std::string title;  ///< For people, for example "Three plain steps".
+  CheckVerdict verdict = CheckVerdict::kNotApplicable;
+  std::optional<double> measured;  ///< Empty if nothing could be measured.
+  double bound = 0.0;              ///< The check fails if `measured` is larger.
+  std::string unit;                ///< Unit of `measured` and `bound`: "m" or "degrees".
+  std::string text;                ///< What was measured or why it was not, as one sentence.
+  std::string advice;              ///< What to do about a failure; empty if the check did not fail.
+};
+
+/// The results of all checks, always in the same order.
+struct SelfCheck {
+  std::vector<CheckResult> checks;
+  [[nodiscard]] bool passed() const;  ///< True if no check failed.
+};
+
+/// Plays a few movements with a library, on level ground at 30 frames per second, and checks them:
+///
+///   three_steps  Three steps of a comfortable length land within 0.2 m of where they should.
+///   stop         After them, a stand brings the feet together within 3 cm.
+///   walk_to      A walk to a goal 3 m straight ahead arrives. If the library has no stop, the walk
+///                ends within half a step of the goal.
+///   knees        Knees bend forward: bent legs deviate at most 60 degrees from their feet.
+///   soles        Soles of standing feet are within 1 cm of the ground, and no sole is deeper.
+///
+/// The same library always gives the same results. Takes some milliseconds to some tenths of a
+/// second. `library` must not be null.
+[[nodiscard]] SelfCheck CheckLibrary(const std::shared_ptr<const MotionLibrary>& library);
+
+/// Returns the whole result in one sentence, for example "Self-check passed."
+[[nodiscard]] std::string DescribeVerdict(const SelfCheck& check);
+
+}  // namespace stridewire
