@@ -77,6 +77,14 @@ json ParseOutput(const std::string& out) {
   return parsed;
 }
 
+// Returns the output of `inspect --json` without what it says about movements in plain words.
+json Groups(const std::string& out) {
+  json library = ParseOutput(out);
+  library.erase("summary");
+  library.erase("self_check");
+  return library;
+}
+
 std::vector<std::string> Keys(const json& object) {
   std::vector<std::string> keys;
   for (const auto& item : object.items()) keys.push_back(item.key());
@@ -263,7 +271,11 @@ TEST_F(LibraryTool, ReportsUnusableCapturesAndWritesNothing) {
       EXPECT_THAT(result.err, HasSubstr("stridewire-library: " + c.named));
       EXPECT_THAT(result.err, HasSubstr("no usable step or jump"));
       if (as_json) {
-        EXPECT_THAT(result.out, IsEmpty());
+        const json report = ParseOutput(result.out);
+        EXPECT_THAT(report["error"].get<std::string>(), HasSubstr("no usable step or jump"));
+        ASSERT_EQ(report["files"].size(), 1u);
+        EXPECT_THAT(report["files"][0]["reason"].get<std::string>(), HasSubstr(c.named));
+        EXPECT_EQ(report["library"], nullptr);
       }
     }
   }
@@ -506,7 +518,10 @@ TEST_F(LibraryTool, BuildReportsAsOneJsonObject) {
   ASSERT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.err, IsEmpty());
   const json report = ParseOutput(result.out);
-  EXPECT_THAT(Keys(report), testing::UnorderedElementsAre("files", "selection", "library"));
+  EXPECT_THAT(Keys(report), testing::UnorderedElementsAre("error", "files", "summary", "self_check",
+                                                          "notes", "selection", "library"));
+  EXPECT_EQ(report["error"], nullptr);
+  EXPECT_EQ(report["files"][0]["reason"], nullptr);
   for (const char* key : {"path", "frames", "fps", "unit_m", "steps_left", "steps_right", "jumps",
                           "rejected", "error"}) {
     EXPECT_THAT(Keys(report["files"][0]), Contains(key));
@@ -516,7 +531,78 @@ TEST_F(LibraryTool, BuildReportsAsOneJsonObject) {
     EXPECT_THAT(Keys(rejected), testing::UnorderedElementsAre("from_s", "to_s", "reason"));
   }
   const ProgramResult inspected = Tool({"inspect", Out(), "--json"});
-  EXPECT_EQ(report["library"], ParseOutput(inspected.out));
+  EXPECT_EQ(report["summary"], ParseOutput(inspected.out)["summary"]);
+  EXPECT_EQ(report["self_check"], ParseOutput(inspected.out)["self_check"]);
+  EXPECT_EQ(report["library"], Groups(inspected.out));
+}
+
+TEST_F(LibraryTool, BuildReportsItsErrorsAsJsonToo) {
+  const ProgramResult kinds = Tool({"build", "--out", Out(), "--json", "--kinds", "hop", kJumps});
+  EXPECT_EQ(kinds.exit_code, 2);
+  EXPECT_THAT(ParseOutput(kinds.out)["error"].get<std::string>(), HasSubstr("--kinds"));
+  const std::string missing = folder_.File("no/such/folder/out");
+  const ProgramResult out = Tool({"build", "--out", missing, "--json", kJumps});
+  EXPECT_EQ(out.exit_code, 1);
+  EXPECT_THAT(ParseOutput(out.out)["error"].get<std::string>(), HasSubstr(missing));
+}
+
+TEST_F(LibraryTool, BuildSaysWhyAFileYieldsNothing) {
+  const ProgramResult result =
+      Tool({"build", "--out", Out(), "--json", "--kinds", "jump", kJumps, kSteps});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = ParseOutput(result.out);
+  EXPECT_EQ(report["files"][0]["reason"], nullptr);
+  EXPECT_THAT(report["files"][1]["reason"].get<std::string>(), HasSubstr("--kinds"));
+}
+
+TEST_F(LibraryTool, BuildPrintsInTextWhatItReportsAsJson) {
+  const Arguments arguments = {"build", "--out", Out(), kSteps};
+  const ProgramResult text = Tool(arguments);
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  const json report = ParseOutput(Tool(Join(arguments, {"--json"})).out);
+  for (const json& sentence : report["summary"]["sentences"]) {
+    EXPECT_THAT(text.out, HasSubstr(sentence.get<std::string>()));
+  }
+  for (const json& missing : report["summary"]["missing"]) {
+    EXPECT_THAT(text.out, HasSubstr(missing["what"].get<std::string>()));
+  }
+  EXPECT_THAT(text.out, HasSubstr(report["self_check"]["verdict"].get<std::string>()));
+  ASSERT_FALSE(report["self_check"]["checks"].empty());
+  for (const json& check : report["self_check"]["checks"]) {
+    EXPECT_THAT(text.out, HasSubstr(check["text"].get<std::string>()));
+  }
+  ASSERT_FALSE(report["notes"].empty());
+  for (const json& note : report["notes"]) {
+    EXPECT_THAT(text.out, HasSubstr(note["text"].get<std::string>()));
+  }
+  for (const json& note : report["files"][0]["notes"]) {
+    EXPECT_THAT(text.out, HasSubstr(note.get<std::string>()));
+  }
+}
+
+TEST_F(LibraryTool, BuildCanSkipTheSelfCheck) {
+  const Arguments arguments = {"build", "--out", Out(), "--no-self-check", kJumps};
+  EXPECT_THAT(Tool(arguments).out, Not(HasSubstr("elf-check")));
+  const json report = ParseOutput(Tool(Join(arguments, {"--json"})).out);
+  EXPECT_EQ(report["self_check"], nullptr);
+  EXPECT_TRUE(report["summary"].is_object());
+}
+
+TEST_F(LibraryTool, SynthesisListsRequestsThatWereNotMet) {
+  const std::string choreography = folder_.Write(
+      "c.json", R"({"movements":[{"step":{"length_m":0.5}},{"step":{"length_m":1.5}}]})");
+  const Arguments arguments = {"synthesize", "builtin", "--choreography",
+                               choreography, "--out",   Out("o.bvh")};
+  const ProgramResult text = Tool(arguments);
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_THAT(text.out, HasSubstr("movements[1] missed its request"));
+  EXPECT_THAT(text.out, Not(HasSubstr("movements[0]")));
+  const json refusals = ParseOutput(Tool(Join(arguments, {"--json"})).out)["refusals"];
+  ASSERT_EQ(refusals.size(), 1u);
+  EXPECT_EQ(refusals[0]["request"], 1);
+  EXPECT_EQ(refusals[0]["asked"]["length_m"], 1.5);
+  EXPECT_LT(refusals[0]["got"]["length_m"], 1.0);
+  EXPECT_THAT(text.out, HasSubstr(refusals[0]["reason"].get<std::string>()));
 }
 
 TEST_F(LibraryTool, BuildReportsTheFateOfEveryExample) {
@@ -789,7 +875,7 @@ TEST_F(LibraryTool, RefinesAndReportsAsOneJsonObject) {
 
   // inspect prints the pseudoexamples.
   const ProgramResult inspected = Tool({"inspect", Out(), "--json"});
-  EXPECT_EQ(report["library"], ParseOutput(inspected.out));
+  EXPECT_EQ(report["library"], Groups(inspected.out));
   const json shown = ParseOutput(Tool({"inspect", Out(), "--json", "--examples"}).out);
   int sites = 0;
   for (const json& group : shown["groups"]) {

@@ -15,6 +15,7 @@ struct BuildCommand {
   bool mirror = false;
   bool all = false;
   double max_pose_error_m = 0.025;
+  bool no_self_check = false;
   bool json = false;
   std::optional<double> unit_m;  // Empty: detected.
   std::string left_ankle, right_ankle, left_ball, right_ball;

@@ -3,15 +3,21 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
+#include "offline/inspect/inspect_json.h"
 #include "stridewire/offline/open_library.h"
+#include "summary_text.h"
 
 namespace stridewire {
 
 int RunInspect(const InspectCommand& command) {
   const auto library = OpenLibrary(command.library);
   if (!library) return PrintInputError(library.error());
-  const nlohmann::ordered_json json = LibraryToJson(**library, command.examples);
+  nlohmann::ordered_json json = LibraryToJson(**library, command.examples);
+  const LibrarySummary summary = Summarize(**library);
+  const SelfCheck check = CheckLibrary(*library);
   if (command.json) {
+    json["summary"] = SummaryToJson(summary);
+    json["self_check"] = SelfCheckToJson(check);
     std::printf("%s\n", Dump(json).c_str());
     return kExitSuccess;
   }
@@ -22,6 +28,8 @@ int RunInspect(const InspectCommand& command) {
               json["skeleton"]["left_foot"].get<std::string>().c_str(),
               json["skeleton"]["right_foot"].get<std::string>().c_str());
   PrintLayers(**library);
+  PrintSummary(summary);
+  PrintSelfCheck(check);
   for (std::size_t g = 0; g < (*library)->groups().size(); ++g) {
     const MotionGroup& group = (*library)->groups()[g];
     const auto& entry = json["groups"][g];

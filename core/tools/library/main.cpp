@@ -133,6 +133,8 @@ int Run(int argc, char** argv) {
       ->check(Number(0.0, 10.0, false))
       ->capture_default_str()
       ->excludes("--all");
+  build_app->add_flag("--no-self-check", build.no_self_check,
+                      "Do not play and check a few movements with the finished library");
   AddJson(build_app, build.json);
   build_app->add_option("files", build.files, "BVH captures")->required()->check(NotEmpty());
   build_app->footer("Example:\n  stridewire-library build --out walk.swl --all 16_*.bvh\n");

@@ -3,6 +3,8 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
+#include "offline/inspect/inspect_json.h"
+#include "offline/inspect/refusals.h"
 #include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/choreography.h"
 #include "stridewire/offline/open_library.h"
@@ -62,14 +64,15 @@ int RunSynthesize(const SynthesizeCommand& command) {
   if (!choreography) return PrintInputError(choreography.error());
   const auto library = OpenLibrary(command.library);
   if (!library) return PrintInputError(library.error());
-  auto synthesis = Synthesize({.library = *library,
-                               .start = choreography->start,
-                               .requests = choreography->movements,
-                               .fps = command.fps,
-                               .options = {.run_time_correction = !command.no_correction,
-                                           .foot_planting = !command.no_planting,
-                                           .terrain = choreography->terrain},
-                               .layers = choreography->layers});
+  const SynthesisInput input{.library = *library,
+                             .start = choreography->start,
+                             .requests = choreography->movements,
+                             .fps = command.fps,
+                             .options = {.run_time_correction = !command.no_correction,
+                                         .foot_planting = !command.no_planting,
+                                         .terrain = choreography->terrain},
+                             .layers = choreography->layers};
+  const auto synthesis = Synthesize(input);
   if (!synthesis) {
     Error error = synthesis.error();
     std::string where = command.choreography;
@@ -77,8 +80,10 @@ int RunSynthesize(const SynthesizeCommand& command) {
     if (!error.where.empty()) where += (error.index >= 0 ? "." : ": ") + error.where;
     error.where = std::move(where);
     error.index = -1;
+    if (command.json) std::printf("%s\n", Dump({{"error", Describe(error)}}).c_str());
     return PrintInputError(error);
   }
+  const std::vector<Refusal> refusals = FindRefusals(input, *synthesis);
   if (Status status =
           WriteBvh((*library)->skeleton(), synthesis->clip, std::filesystem::path(command.out));
       !status) {
@@ -113,6 +118,7 @@ int RunSynthesize(const SynthesizeCommand& command) {
            {"missed_m", unreachable.missed.distance_m},
            {"missed_rad", unreachable.missed.turn_rad}});
     }
+    json["refusals"] = RefusalsToJson(refusals);
     std::printf("%s\n", Dump(json).c_str());
     return kExitSuccess;
   }
@@ -122,15 +128,9 @@ int RunSynthesize(const SynthesizeCommand& command) {
               synthesis->clip.frame_count(), synthesis->clip.duration_s(),
               synthesis->movements.size());
   if (clamped > 0) std::printf(", %d of them clamped (use --json for details)", clamped);
-  for (const WalkRecord& walk : synthesis->walks) {
-    if (walk.arrived) continue;
-    std::printf("; movements[%llu] did not arrive: %s",
-                static_cast<unsigned long long>(walk.request_id - 1), walk.reason.c_str());
-  }
-  for (const UnreachableFootprint& unreachable : synthesis->unreachable_footprints) {
-    std::printf("; movements[%llu] was skipped: %s",
-                static_cast<unsigned long long>(unreachable.request_id - 1),
-                unreachable.reason.c_str());
+  for (const Refusal& refusal : refusals) {
+    const auto request = static_cast<unsigned long long>(refusal.request_id - 1);
+    std::printf("; movements[%llu] %s", request, refusal.reason.c_str());
   }
   std::printf("\n");
   return kExitSuccess;

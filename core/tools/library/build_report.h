@@ -1,0 +1,36 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "offline/extract/assemble.h"
+#include "offline/extract/extract.h"
+#include "stridewire/offline/library_builder.h"
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+
+// Reports on a build. As text, it prints each part at once. As JSON, it collects all parts and
+// prints one object at the end, even if the build fails. The JSON contains all that the text says.
+class BuildReport {
+ public:
+  explicit BuildReport(bool as_json);
+
+  // Reports on a file, and prints on stderr why the file is unusable if it is.
+  void AddFile(const Extraction& extraction, const AssembleOptions& options);
+
+  // Reports on the library written to `path`: its groups, notes and summary and, unless
+  // `skips_self_check`, its self-check.
+  void AddLibrary(const std::string& path, const std::shared_ptr<const MotionLibrary>& library,
+                  const LibraryBuilder& builder, bool skips_self_check);
+
+  // Ends the report. Fail prints the sentence on stderr as well. Both return the exit code.
+  int Fail(const std::string& sentence, int exit_code);
+  int Succeed();
+
+ private:
+  bool as_json_;
+  nlohmann::ordered_json json_;
+};
+
+}  // namespace stridewire
