@@ -39,6 +39,8 @@ CorpusCase DrawCase(Movement movement, unsigned seed) {
   const DrawnMovement drawn = DrawMovement(movement, figure, random);
   result.steps = drawn.steps;
   result.jumps = drawn.jumps;
+  result.mean_move_m = drawn.mean_move_m;
+  result.move_tolerance_m = drawn.move_tolerance_m;
   Rig rig = MakeRig(figure, drawn.motion);
   result.description = drawn.description + DrawRig(movement, random, rig);
   const DrawnNotation notation = DrawNotation(random, rig.frame_count());

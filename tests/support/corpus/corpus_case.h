@@ -40,6 +40,12 @@ struct CorpusCase {
   std::array<int, 2> steps{};  ///< Steps of the left and the right foot.
   int jumps = 0;
   double leg_m = 0.0;  ///< True length of a leg.
+  /// Mean displacement of the moving foot over a step: x to the left, z forward, in the heading of
+  /// the walk. Walks only.
+  DVec3 mean_move_m = DVec3(0.0);
+  /// Distance by which measurements of `mean_move_m` may differ, for example if a step at the edge
+  /// of the recording is lost.
+  double move_tolerance_m = 0.0;
 };
 
 /// Draws the file of a movement: body proportions, details of the movement, rig, axes, unit, frame

@@ -48,6 +48,7 @@ WalkOptions DrawWalk(const Figure& figure, Random& random, std::string& descript
   walk.step_s = random.Draw(0.5, 0.75);
   walk.support_s = random.Draw(0.2, 0.28) * walk.step_s;
   walk.lift_m = random.Draw(0.07, 0.14);
+  walk.heel_rad = Chance(random, 0.5) ? random.Draw(5.0, 20.0) * kDegree : 0.0;
   walk.heading_rad = random.Draw(-3.1, 3.1);
   const double kind = random.Draw(0.0, 1.0);
   if (kind < 0.55) {
@@ -91,9 +92,28 @@ void InsertRestPose(const Figure& figure, const WalkOptions& walk, Random& rando
   drawn.description += Text("; T-pose for 1 s, %.1f cm high", 100.0 * height_m);
 }
 
+// Sets the mean displacement of the feet over the recorded steps.
+void SetMeanMove(const WalkOptions& walk, const Gait& gait, DrawnMovement& drawn) {
+  DVec3 sum(0.0);
+  int count = 0;
+  for (const std::vector<Footprint>& prints : gait.prints) {
+    for (std::size_t k = 0; k + 1 < prints.size(); ++k) {
+      if (prints[k].lift_s < gait.begin_s || prints[k + 1].land_s > gait.end_s) continue;
+      const double yaw_rad = 0.5 * (prints[k].yaw_rad + prints[k + 1].yaw_rad);
+      sum += AboutY(-yaw_rad) * (prints[k + 1].ball_m - prints[k].ball_m);
+      ++count;
+    }
+  }
+  drawn.mean_move_m = DVec3(sum.x, 0.0, sum.z) / static_cast<double>(std::max(1, count));
+  drawn.move_tolerance_m =
+      0.06 + 0.1 * glm::length(drawn.mean_move_m) + 0.3 * std::fabs(walk.turn_rad);
+}
+
 void AddWalk(const Figure& figure, double fps, Random& random, DrawnMovement& drawn) {
   const WalkOptions walk = DrawWalk(figure, random, drawn.description);
-  drawn.motion = RenderGait(figure, PlanWalk(figure, walk), fps);
+  const Gait gait = PlanWalk(figure, walk);
+  drawn.motion = RenderGait(figure, gait, fps);
+  SetMeanMove(walk, gait, drawn);
   for (int k = 0; k < walk.steps; ++k) {
     drawn.steps[static_cast<std::size_t>((walk.first_foot + k) % 2)] += 1;
   }

@@ -15,6 +15,8 @@ struct DrawnMovement {
   double declared_fps = 30.0;  ///< Differs from motion.fps if the file declares a wrong rate.
   std::array<int, 2> steps{};
   int jumps = 0;
+  DVec3 mean_move_m = DVec3(0.0);  ///< As in CorpusCase.
+  double move_tolerance_m = 0.0;
   std::string description;
 };
 

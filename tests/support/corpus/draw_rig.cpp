@@ -12,8 +12,8 @@ struct Unit {
   double m;
   const char* name;
 };
-constexpr Unit kUnits[] = {
-    {1.0, "m"}, {0.01, "cm"}, {0.01, "cm"}, {0.0254, "inch"}, {0.0254 / 0.45, "CMU unit"}};
+constexpr Unit kUnits[] = {{1.0, "m"},    {0.01, "cm"},     {0.01, "cm"},
+                           {0.001, "mm"}, {0.0254, "inch"}, {0.0254 / 0.45, "CMU unit"}};
 
 struct Orientation {
   const char* name;
@@ -156,6 +156,7 @@ DrawnNotation DrawNotation(Random& random, int frame_count) {
     notation.comment = "# exported by a program";
     text += "; comment";
   }
+  notation.frame_time_digits = 5 + Below(random, 4);
   if (Chance(random, 0.15)) {
     const std::string counts[] = {"0", std::to_string(frame_count + 7),
                                   std::to_string(frame_count) + ".0"};

@@ -104,6 +104,21 @@ class GaitRenderer {
     return speed * fall_s - 0.5 * kGravity * fall_s * fall_s;
   }
 
+  // Positive if the heel is raised, negative while a foot that landed with the heel becomes flat.
+  double StandingPitch(const Footprint& print, double t) const {
+    const double contact_s = print.lift_s - print.land_s;
+    const double roll_s = std::min(kRollS, contact_s);
+    const double raised = gait_.roll_rad * Ease((t - print.lift_s + roll_s) / roll_s);
+    return raised - gait_.heel_rad * (1.0 - Ease((t - print.land_s) / kHeelS));
+  }
+
+  // How far the ball is from its footprint if a foot pitches up about its heel.
+  DVec3 BallAboveHeel(const Footprint& print, double pitch) const {
+    const DVec3 heel(0.0, -figure_.AnkleHeight(), -0.06 * figure_.scale());
+    const DVec3 arm = figure_.Ball() - heel;
+    return AboutY(print.yaw_rad) * (AboutX(std::min(0.0, pitch)) * arm - arm);
+  }
+
   FigurePose::LegPose LegAt(int foot, double t, double heading_rad) const {
     const std::vector<Footprint>& prints = gait_.prints[static_cast<std::size_t>(foot)];
     std::size_t k = 0;
@@ -111,27 +126,26 @@ class GaitRenderer {
     const Footprint& from = prints[k];
     DVec3 ball = from.ball_m;
     double yaw = from.yaw_rad;
-    double roll = 0.0;
+    double pitch = 0.0;
     double toe_bend = 0.0;
     if (t < from.lift_s || k + 1 == prints.size()) {
-      roll = gait_.roll_rad * Ease((t - from.lift_s + kRollS) / kRollS);
-      if (from.lift_s - from.land_s < kRollS) {  // Short contacts begin flat.
-        roll = gait_.roll_rad * Ease((t - from.land_s) / (from.lift_s - from.land_s));
-      }
-      toe_bend = -roll;
+      pitch = StandingPitch(from, t);
+      toe_bend = -std::max(0.0, pitch);
+      ball += BallAboveHeel(from, pitch);
     } else {
       const Footprint& to = prints[k + 1];
+      const DVec3 landing = to.ball_m + BallAboveHeel(to, -gait_.heel_rad);
       const double u = (t - from.lift_s) / (to.land_s - from.lift_s);
-      ball += Ease(u) * (to.ball_m - from.ball_m);
-      const bool climbs = to.ball_m.y > from.ball_m.y;
-      ball.y = Lerp(from.ball_m.y, to.ball_m.y, climbs ? Ease(u / 0.6) : Ease((u - 0.4) / 0.6));
+      ball += Ease(u) * (landing - ball);
+      const bool climbs = landing.y > from.ball_m.y;
+      ball.y = Lerp(from.ball_m.y, landing.y, climbs ? Ease(u / 0.6) : Ease((u - 0.4) / 0.6));
       ball.y += gait_.lift_m * std::sin(kPi * u) * std::sin(kPi * u);
       yaw = Lerp(from.yaw_rad, to.yaw_rad, Ease(u));
-      roll = gait_.roll_rad * (1.0 - Ease(u / 0.6));
-      toe_bend = -roll * (1.0 - Ease(u / 0.3));
+      pitch = gait_.roll_rad * (1.0 - Ease(u / 0.6)) - gait_.heel_rad * Ease((u - 0.6) / 0.4);
+      toe_bend = -gait_.roll_rad * (1.0 - Ease(u / 0.3));
     }
     FigurePose::LegPose leg;
-    leg.foot = AboutY(yaw) * AboutX(roll);
+    leg.foot = AboutY(yaw) * AboutX(pitch);
     leg.ankle_m = ball - leg.foot * figure_.Ball();
     leg.knee_towards = Turn(0.5 * (yaw + heading_rad), DVec3(0.0, 0.0, 1.0));
     leg.toe_bend_rad = toe_bend;
@@ -167,6 +181,7 @@ Gait PlanWalk(const Figure& figure, const WalkOptions& options) {
   gait.lift_m = options.lift_m;
   const bool forward = options.length_m > 0.3 && options.side_m == 0.0;
   gait.roll_rad = forward ? 30.0 * kDegree : 0.0;
+  gait.heel_rad = forward ? options.heel_rad : 0.0;
   DVec3 centre = options.start_m;
   double yaw = options.heading_rad;
   double step_height = 0.0;

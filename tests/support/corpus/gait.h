@@ -29,6 +29,7 @@ struct Gait {
   double smooth_s = 0.4;                         ///< The pelvis averages the path over this time.
   double lift_m = 0.1;                           ///< Height of a swing above its footprints.
   double roll_rad = 0.0;  ///< Pitch of the foot when it leaves the ground; 0 keeps it flat.
+  double heel_rad = 0.0;  ///< Upward pitch of a foot that lands with the heel; 0 lands flat.
   double flight_s = 0.0;  ///< Runs: time with both feet in the air; the pelvis follows a parabola.
   double step_s = 0.6;    ///< Time from one step to the next.
   double begin_s = 0.0;
@@ -45,6 +46,7 @@ struct WalkOptions {
   double step_s = 0.6;
   double support_s = 0.15;  ///< Time with both feet on the ground.
   double lift_m = 0.1;
+  double heel_rad = 0.0;   ///< Pitch with which the heel lands first, for steps ahead.
   bool starts = true;      ///< Begins standing; otherwise within the walk.
   bool stops = true;       ///< Ends standing; otherwise within the walk.
   double stand_s = 1.0;    ///< Standing time before and after the steps.
@@ -69,7 +71,10 @@ struct RunOptions {
 
 [[nodiscard]] Gait PlanRun(const Figure& figure, const RunOptions& options);
 
-/// Computes the poses of a gait. Standing balls do not move, and no ankle is out of reach.
+/// A foot that lands with the heel is flat after this time.
+inline constexpr double kHeelS = 0.1;
+
+/// Computes the poses of a gait. Balls of flat feet do not move, and no ankle is out of reach.
 [[nodiscard]] FigureMotion RenderGait(const Figure& figure, const Gait& gait, double fps);
 
 }  // namespace stridewire::test
