@@ -17,6 +17,8 @@ install(DIRECTORY core/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
         FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
 install(FILES ${PROJECT_BINARY_DIR}/core/include/stridewire/base/version.h
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/stridewire/base)
+install(DIRECTORY ${PROJECT_BINARY_DIR}/protocol/generated/include/
+        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 foreach(include_dir protocol/include client_sdk/c/include client_sdk/cpp/include)
   if(EXISTS ${PROJECT_SOURCE_DIR}/${include_dir})
     install(DIRECTORY ${include_dir}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}

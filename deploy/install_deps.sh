@@ -31,7 +31,7 @@ build=(
   ninja-build
   nlohmann-json3-dev
   prometheus-cpp-dev
-  python3  # Runs checks of the source tree.
+  python3  # Generates code from the schema of the protocol, and runs checks of the source tree.
 )
 tests=(
   assimp-testmodels  # Contains two motion captures, which the tests and the demo use.

@@ -4,6 +4,8 @@
 #include <bit>
 #include <cstring>
 
+#include "message_list.h"
+
 namespace stridewire::protocol {
 namespace {
 
@@ -21,34 +23,10 @@ T Load(const std::byte* bytes) {
 
 std::string_view MessageTypeName(MessageType type) {
   switch (type) {
-    case MessageType::kHello: return "Hello";
-    case MessageType::kJoinWorld: return "JoinWorld";
-    case MessageType::kLeaveWorld: return "LeaveWorld";
-    case MessageType::kSpawn: return "Spawn";
-    case MessageType::kRemove: return "Remove";
-    case MessageType::kRequest: return "Request";
-    case MessageType::kCancelQueue: return "CancelQueue";
-    case MessageType::kObserve: return "Observe";
-    case MessageType::kStopObserving: return "StopObserving";
-    case MessageType::kPing: return "Ping";
-    case MessageType::kInspectAvatar: return "InspectAvatar";
-    case MessageType::kGoodbye: return "Goodbye";
-    case MessageType::kWelcome: return "Welcome";
-    case MessageType::kWorldInfo: return "WorldInfo";
-    case MessageType::kReply: return "Reply";
-    case MessageType::kPoseBatch: return "PoseBatch";
-    case MessageType::kEvents: return "Events";
-    case MessageType::kLagging: return "Lagging";
-    case MessageType::kError: return "Error";
-    case MessageType::kPong: return "Pong";
-    case MessageType::kAvatarState: return "AvatarState";
-    case MessageType::kSetTerrain: return "SetTerrain";
-    case MessageType::kWorldTerrain: return "WorldTerrain";
-    case MessageType::kSetLayers: return "SetLayers";
-    case MessageType::kSetPlanting: return "SetPlanting";
-    case MessageType::kFetchLibrary: return "FetchLibrary";
-    case MessageType::kMovements: return "Movements";
-    case MessageType::kLibraryPiece: return "LibraryPiece";
+#define STRIDEWIRE_CASE(Struct, Name, ...) \
+  case MessageType::k##Name: return #Name;
+    STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)
+#undef STRIDEWIRE_CASE
   }
   return "unknown";
 }
@@ -56,29 +34,23 @@ std::string_view MessageTypeName(MessageType type) {
 bool IsKnown(MessageType type) { return MessageTypeName(type) != "unknown"; }
 
 bool MaySend(Sender sender, MessageType type) {
-  if (!IsKnown(type)) return false;
-  if (type == MessageType::kGoodbye) return true;
-  return (sender == Sender::kClient) == (type < MessageType::kGoodbye);
+  switch (type) {
+#define STRIDEWIRE_CASE(Struct, Name, from_client, from_server, ...) \
+  case MessageType::k##Name: return sender == Sender::kClient ? from_client : from_server;
+    STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)
+#undef STRIDEWIRE_CASE
+  }
+  return false;
 }
 
 bool IsBulk(MessageType type) {
   switch (type) {
-    case MessageType::kSpawn:
-    case MessageType::kRemove:
-    case MessageType::kRequest:
-    case MessageType::kCancelQueue:
-    case MessageType::kObserve:
-    case MessageType::kReply:
-    case MessageType::kPoseBatch:
-    case MessageType::kEvents:
-    case MessageType::kSetTerrain:
-    case MessageType::kSetLayers:
-    case MessageType::kSetPlanting:
-    case MessageType::kWorldTerrain:
-    case MessageType::kMovements:
-    case MessageType::kLibraryPiece: return true;
-    default: return false;
+#define STRIDEWIRE_CASE(Struct, Name, from_client, from_server, is_bulk) \
+  case MessageType::k##Name: return is_bulk;
+    STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)
+#undef STRIDEWIRE_CASE
   }
+  return false;
 }
 
 std::size_t MaxPayloadBytes(MessageType type, const FrameLimits& limits) {

@@ -12,9 +12,9 @@ import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  maxAuthTokenBytes, maxAvatarNumber, maxBulkBytes, maxControlBytes, maxItems, maxNameBytes,
-  maxReplyMemory, protocolVersion
-} from './wire/limits';
+  maxAuthTokenBytes, maxBulkBytes, maxControlBytes, maxItems, maxNameBytes, protocolVersion,
+  replyCache
+} from '../generated/limits';
 import {Malformed} from './wire/malformed';
 import type {
   AvatarStateMessage, ClientMessage, CommandMessage, ErrorNotice, Events, Goodbye, Lagging, Pong,
@@ -357,9 +357,9 @@ export class Session {
   inspect(world: WorldHandle, avatar: number): Promise<AvatarState> {
     return new Promise((resolve, reject) => {
       const refuse = (code: number, text = ''): void => reject(new StridewireError(code, text));
-      if (!Number.isInteger(avatar) || avatar < 1 || avatar > maxAvatarNumber) {
+      if (!Number.isInteger(avatar) || avatar < 1 || avatar > check.maxAvatarNumber) {
         return refuse(Status.invalid_argument,
-                      `avatar: expected an integer from 1 to ${maxAvatarNumber}, got ${avatar}`);
+                      `avatar: expected 1 to ${check.maxAvatarNumber}, got ${avatar}`);
       }
       if (this.stateNow !== 'ready' || world.serverId === 0) return refuse(Status.not_ready);
       if (this.inspections.size >= maxInspections) return refuse(Status.commands_full);
@@ -568,7 +568,7 @@ export class Session {
   }
 
   private maySend(): boolean {
-    const memory = Math.min(Math.max(this.limits?.replyMemory ?? 1, 1), maxReplyMemory);
+    const memory = Math.min(Math.max(this.limits?.replyMemory ?? 1, 1), replyCache);
     return this.pending < maxOutputBytes && this.unanswered.size < memory;
   }
 

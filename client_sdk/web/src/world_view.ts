@@ -3,7 +3,7 @@ import {reserve} from './pose_buffers';
 import {flagsOf, lastingFlags} from './pose_flags';
 import {PoseHistory} from './pose_history';
 import {PoseFlag, type CrowdPose, type Pose, type PoseKind} from './types';
-import {maxItems} from './wire/limits';
+import {maxItems} from '../generated/limits';
 import {Malformed} from './wire/malformed';
 import type {PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';

@@ -155,11 +155,11 @@ TEST(Check, Spawn) {
   for (int k = 0; k < 3; ++k) {
     RefusedWhenNotFinite<Spawn>(
         GoodSpawn(), [k](Spawn& m) -> double& { return m.items[1].start.position_m[k]; },
-        "Spawn.start", 1);
+        "Spawn.items.position_m", 1);
   }
   RefusedWhenNotFinite<Spawn>(
-      GoodSpawn(), [](Spawn& m) -> double& { return m.items[0].start.heading_rad; }, "Spawn.start",
-      0);
+      GoodSpawn(), [](Spawn& m) -> double& { return m.items[0].start.heading_rad; },
+      "Spawn.items.heading_rad", 0);
 }
 
 template <typename T>
@@ -190,16 +190,17 @@ TEST(Check, Request) {
       good, [](Request& m) { m.items.assign(kMaxItems + 1, m.items[0]); },
       ErrorCode::kLimitExceeded, "Request.items");
   Refused<Request>(
-      good, [](Request& m) { m.items[2].avatar = 0; }, ErrorCode::kOutOfRange, "Request.avatar", 2);
+      good, [](Request& m) { m.items[2].avatar = 0; }, ErrorCode::kOutOfRange,
+      "Request.items.avatar", 2);
   Refused<Request>(
       good, [](Request& m) { m.items[1].request_id = 0; }, ErrorCode::kOutOfRange,
-      "Request.request_id", 1);
+      "Request.items.request_id", 1);
   Refused<Request>(
       good,
       [](Request& m) {
         std::get<StepMovement>(m.items[0].movement).foot = static_cast<FootChoice>(3);
       },
-      ErrorCode::kMalformed, "Request.foot", 0);
+      ErrorCode::kMalformed, "Request.items.foot", 0);
   const auto step = [](Request& m) -> StepMovement& {
     return std::get<StepMovement>(m.items[0].movement);
   };
@@ -208,22 +209,22 @@ TEST(Check, Request) {
   };
   using R = Request;
   RefusedWhenNotFinite<R>(
-      good, [&](R& m) -> double& { return step(m).length_m; }, "Request.length_m", 0);
+      good, [&](R& m) -> double& { return step(m).length_m; }, "Request.items.length_m", 0);
   RefusedWhenNotFinite<R>(
-      good, [&](R& m) -> double& { return step(m).side_m.emplace(); }, "Request.side_m", 0);
+      good, [&](R& m) -> double& { return step(m).side_m.emplace(); }, "Request.items.side_m", 0);
   RefusedWhenNotFinite<R>(
-      good, [&](R& m) -> double& { return step(m).height_m; }, "Request.height_m", 0);
+      good, [&](R& m) -> double& { return step(m).height_m; }, "Request.items.height_m", 0);
   RefusedWhenNotFinite<R>(
-      good, [&](R& m) -> double& { return step(m).turn_rad; }, "Request.turn_rad", 0);
+      good, [&](R& m) -> double& { return step(m).turn_rad; }, "Request.items.turn_rad", 0);
   RefusedWhenNotFinite<R>(
-      good, [&](R& m) -> double& { return jump(m).length_m; }, "Request.length_m", 1);
+      good, [&](R& m) -> double& { return jump(m).length_m; }, "Request.items.length_m", 1);
   RefusedWhenNotFinite<R>(
-      good, [&](R& m) -> double& { return jump(m).height_m; }, "Request.height_m", 1);
+      good, [&](R& m) -> double& { return jump(m).height_m; }, "Request.items.height_m", 1);
   RefusedWhenNotFinite<R>(
-      good, [&](R& m) -> double& { return jump(m).turn_rad; }, "Request.turn_rad", 1);
+      good, [&](R& m) -> double& { return jump(m).turn_rad; }, "Request.items.turn_rad", 1);
   RefusedWhenNotFinite<R>(
       good, [](R& m) -> double& { return std::get<StandMovement>(m.items[2].movement).seconds; },
-      "Request.seconds", 2);
+      "Request.items.seconds", 2);
 }
 
 TEST(Check, Observe) {
@@ -258,16 +259,17 @@ TEST(Check, Observe) {
   rings.region->ring_details = {PoseDetail::kAll, PoseDetail::kRoot};
   Refused<Observe>(
       rings, [](Observe& m) { m.region->ring_details.pop_back(); }, ErrorCode::kMalformed,
-      "Region.ring_details", 1);
+      "Observe.region.ring_details", 1);
   Refused<Observe>(
       rings, [](Observe& m) { m.region->rings.clear(); }, ErrorCode::kMalformed,
-      "Region.ring_details", 2);
+      "Observe.region.ring_details", 2);
   Refused<Observe>(
       rings, [](Observe& m) { m.region->ring_details[1] = static_cast<PoseDetail>(3); },
-      ErrorCode::kMalformed, "Region.ring_details", 1);
+      ErrorCode::kMalformed, "Observe.region.ring_details", 1);
   for (const PoseMode mode : {PoseMode::kFull, PoseMode::kMovement}) {
     Refused<Observe>(
-        rings, [&](Observe& m) { m.mode = mode; }, ErrorCode::kUnsupported, "Region.ring_details");
+        rings, [&](Observe& m) { m.mode = mode; }, ErrorCode::kUnsupported,
+        "Observe.region.ring_details");
   }
   Refused<StopObserving>(
       {1, 2}, [](StopObserving& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "StopObserving.seq");
@@ -342,42 +344,42 @@ TEST(Check, WorldInfo) {
       "WorldInfo.skeleton.end_sites");
   RefusedTexts<W>(
       good, [](W& m) -> std::string& { return m.skeleton.joints[1].name; }, kMaxNameBytes, false,
-      "WorldInfo.joint.name", 1);
+      "WorldInfo.skeleton.joints.name", 1);
   Refused<W>(
       good, [](W& m) { m.skeleton.joints[2].name = m.skeleton.joints[0].name; },
-      ErrorCode::kMalformed, "WorldInfo.joint.name");
+      ErrorCode::kMalformed, "WorldInfo.skeleton.joints.name");
   Refused<W>(
       good, [](W& m) { m.skeleton.joints[0].parent = 0; }, ErrorCode::kOutOfRange,
-      "WorldInfo.joint.parent", 0);
+      "WorldInfo.skeleton.joints.parent", 0);
   for (const int parent : {-2, -1, 2, 3}) {
     Refused<W>(
         good, [&](W& m) { m.skeleton.joints[2].parent = static_cast<std::int16_t>(parent); },
-        ErrorCode::kOutOfRange, "WorldInfo.joint.parent", 2);
+        ErrorCode::kOutOfRange, "WorldInfo.skeleton.joints.parent", 2);
   }
   const float nan = std::numeric_limits<float>::quiet_NaN();
   Refused<W>(
       good, [&](W& m) { m.skeleton.joints[1].offset_m.y = nan; }, ErrorCode::kOutOfRange,
-      "WorldInfo.joint.offset_m", 1);
+      "WorldInfo.skeleton.joints.offset_m", 1);
   Refused<W>(
       good, [](W& m) { m.skeleton.end_sites[0].joint = 3; }, ErrorCode::kOutOfRange,
-      "WorldInfo.end_site.joint", 0);
+      "WorldInfo.skeleton.end_sites.joint", 0);
   Refused<W>(
       good, [&](W& m) { m.skeleton.end_sites[0].offset_m.z = nan; }, ErrorCode::kOutOfRange,
-      "WorldInfo.end_site.offset_m", 0);
+      "WorldInfo.skeleton.end_sites.offset_m", 0);
   for (std::int16_t LegInfo::* joint :
        {&LegInfo::hip, &LegInfo::knee, &LegInfo::ankle, &LegInfo::ball}) {
     for (const int bad : {-2, 3}) {
       Refused<W>(
           good, [&](W& m) { m.skeleton.legs[1].*joint = static_cast<std::int16_t>(bad); },
-          ErrorCode::kOutOfRange, "WorldInfo.leg");
+          ErrorCode::kOutOfRange, "WorldInfo.skeleton.right_leg");
     }
   }
   Refused<W>(
       good, [&](W& m) { m.skeleton.legs[0].ball_offset_m.x = nan; }, ErrorCode::kOutOfRange,
-      "WorldInfo.leg.ball_offset_m");
+      "WorldInfo.skeleton.left_leg.ball_offset_m");
   Refused<W>(
       good, [&](W& m) { m.skeleton.legs[1].toe_tip_offset_m.x = nan; }, ErrorCode::kOutOfRange,
-      "WorldInfo.leg.toe_tip_offset_m");
+      "WorldInfo.skeleton.right_leg.toe_tip_offset_m");
   W with_codes = good;
   with_codes.rotation_codes.resize(good.skeleton.joints.size());
   with_codes.rotation_codes[0].smallest_three_bits = 12;
@@ -387,12 +389,12 @@ TEST(Check, WorldInfo) {
       "WorldInfo.rotation_codes");
   Refused<W>(
       with_codes, [&](W& m) { m.rotation_codes[1].step.y = nan; }, ErrorCode::kOutOfRange,
-      "WorldInfo.rotation_codes", 1);
+      "WorldInfo.rotation_codes.step", 1);
   Refused<W>(
       with_codes, [](W& m) { m.rotation_codes[0].smallest_three_bits = 0; }, ErrorCode::kMalformed,
       "WorldInfo.rotation_codes", 0);
   Refused<W>(
-      with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kShapeMismatch,
+      with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kLimitExceeded,
       "WorldInfo.rotation_codes");
   W with_fewer = with_codes;
   with_fewer.reduced_joints = {0, 1};
@@ -419,10 +421,10 @@ TEST(Check, Reply) {
       good, [](Reply& m) -> std::string& { return m.text; }, kMaxTextBytes, true, "Reply.text");
   RefusedTexts<Reply>(
       good, [](Reply& m) -> std::string& { return m.items[0].text; }, kMaxReasonBytes, true,
-      "Reply.item.text", 0);
+      "Reply.items.text", 0);
   Refused<Reply>(
-      good, [](Reply& m) { m.items[0].index = kMaxItems; }, ErrorCode::kOutOfRange, "Reply.index",
-      0);
+      good, [](Reply& m) { m.items[0].index = kMaxItems; }, ErrorCode::kOutOfRange,
+      "Reply.items.index", 0);
   Refused<Reply>(
       good, [](Reply& m) { m.items.resize(kMaxItems + 1); }, ErrorCode::kLimitExceeded,
       "Reply.items");
@@ -437,11 +439,11 @@ TEST(Check, PoseBatch) {
   static const std::vector<std::byte> poses(2 * PoseBytes(PoseMode::kQuantised, 3));
   const B good{{1, 0, 0, 1, 0, 0.0, PoseMode::kQuantised, 3}, avatars, flags, poses};
   Refused<B>(good, [](B& m) { m.info.world = 0; }, ErrorCode::kOutOfRange, "PoseBatch.world");
-  Refused<B>(good, [](B& m) { m.info.parts = 0; }, ErrorCode::kOutOfRange, "PoseBatch.part");
+  Refused<B>(good, [](B& m) { m.info.parts = 0; }, ErrorCode::kOutOfRange, "PoseBatch.parts");
   Refused<B>(good, [](B& m) { m.info.part = 1; }, ErrorCode::kOutOfRange, "PoseBatch.part");
   Refused<B>(
       good, [](B& m) { m.info.parts = kMaxBatchParts + 1; }, ErrorCode::kOutOfRange,
-      "PoseBatch.part");
+      "PoseBatch.parts");
   RefusedWhenNotFinite<B>(
       good, [](B& m) -> double& { return m.info.server_time_s; }, "PoseBatch.server_time_s");
   Refused<B>(
@@ -505,7 +507,7 @@ TEST(Check, AvatarState) {
   RefusedWhenNotFinite<S>(
       good, [](S& m) -> double& { return m.server_time_s; }, "AvatarState.server_time_s");
   RefusedWhenNotFinite<S>(
-      good, [](S& m) -> double& { return m.base.heading_rad; }, "AvatarState.base");
+      good, [](S& m) -> double& { return m.base.heading_rad; }, "AvatarState.base_heading_rad");
   Refused<S>(
       good, [](S& m) { m.queue_size = 1; }, ErrorCode::kShapeMismatch, "AvatarState.queue", 1);
   Refused<S>(
@@ -516,8 +518,8 @@ TEST(Check, AvatarState) {
       },
       ErrorCode::kLimitExceeded, "AvatarState.queue");
   Refused<S>(
-      good, [](S& m) { m.queue[1].request_id = 0; }, ErrorCode::kOutOfRange, "Request.request_id",
-      1);
+      good, [](S& m) { m.queue[1].request_id = 0; }, ErrorCode::kOutOfRange,
+      "AvatarState.queue.request_id", 1);
 }
 
 TEST(Check, ExactOnlyNeedsAFootprint) {
@@ -527,7 +529,7 @@ TEST(Check, ExactOnlyNeedsAFootprint) {
   const Status status = Check(message);
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
-  EXPECT_EQ(status.error().where, "Request.at_m");
+  EXPECT_EQ(status.error().where, "Request.items.at_m");
   EXPECT_STREQ(status.error().text, "must_be_met requires at_m");
 }
 
@@ -538,9 +540,9 @@ TEST(Check, Footprints) {
     return *std::get<StepMovement>(m.items[0].movement).at;
   };
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return at(m).position_m.z; }, "Request.at_m");
+      good, [&](Request& m) -> double& { return at(m).position_m.z; }, "Request.items.at_m");
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return *at(m).heading_rad; }, "Request.heading_rad");
+      good, [&](Request& m) -> double& { return *at(m).heading_rad; }, "Request.items.heading_rad");
 }
 
 TEST(Check, Walks) {
@@ -550,16 +552,18 @@ TEST(Check, Walks) {
     return std::get<WalkMovement>(m.items[0].movement);
   };
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return walk(m).position_m.z; }, "Request.at_m");
+      good, [&](Request& m) -> double& { return walk(m).position_m.z; }, "Request.items.at_m");
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return walk(m).heading_rad; }, "Request.heading_rad");
+      good, [&](Request& m) -> double& { return walk(m).heading_rad; },
+      "Request.items.heading_rad");
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return walk(m).waypoints_m[0].x; }, "Request.waypoints_m");
+      good, [&](Request& m) -> double& { return walk(m).waypoints_m[0].x; },
+      "Request.items.waypoints_m");
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return *walk(m).speed_m_s; }, "Request.speed_m_s");
+      good, [&](Request& m) -> double& { return *walk(m).speed_m_s; }, "Request.items.speed_m_s");
   Refused<Request>(
       good, [&](Request& m) { walk(m).waypoints_m.resize(kMaxWaypoints + 1); },
-      ErrorCode::kLimitExceeded, "Request.waypoints_m", kMaxWaypoints + 1);
+      ErrorCode::kLimitExceeded, "Request.items.waypoints_m", 0);
 }
 
 TEST(Check, Layers) {
@@ -569,18 +573,19 @@ TEST(Check, Layers) {
   Refused<L>(good, [](L& m) { m.seq = 0; }, kRange, "SetLayers.seq");
   Refused<L>(good, [](L& m) { m.world = 0; }, kRange, "SetLayers.world");
   Refused<L>(good, [](L& m) { m.items.clear(); }, ErrorCode::kMalformed, "SetLayers.items");
-  Refused<L>(good, [](L& m) { m.items[1].avatar = 0; }, kRange, "SetLayers.avatar", 1);
+  Refused<L>(good, [](L& m) { m.items[1].avatar = 0; }, kRange, "SetLayers.items.avatar", 1);
   Refused<L>(
-      good, [](L& m) { m.items[1].layer.clear(); }, ErrorCode::kMalformed, "SetLayers.layer", 1);
+      good, [](L& m) { m.items[1].layer.clear(); }, ErrorCode::kMalformed, "SetLayers.items.layer",
+      1);
   Refused<L>(
       good, [](L& m) { m.items[0].layer.assign(65, 'a'); }, ErrorCode::kLimitExceeded,
-      "SetLayers.layer", 0);
+      "SetLayers.items.layer", 0);
   RefusedWhenNotFinite<L>(
-      good, [](L& m) -> double& { return m.items[0].weight; }, "SetLayers.weight");
+      good, [](L& m) -> double& { return m.items[0].weight; }, "SetLayers.items.weight");
   RefusedWhenNotFinite<L>(
-      good, [](L& m) -> double& { return m.items[0].blend_s; }, "SetLayers.blend_s");
+      good, [](L& m) -> double& { return m.items[0].blend_s; }, "SetLayers.items.blend_s");
   RefusedWhenNotFinite<L>(
-      good, [](L& m) -> double& { return m.items[0].speed; }, "SetLayers.speed");
+      good, [](L& m) -> double& { return m.items[0].speed; }, "SetLayers.items.speed");
 }
 
 TEST(Check, Movements) {
@@ -597,7 +602,7 @@ TEST(Check, Movements) {
   EXPECT_EQ(good.record(2).data(), good.records.data() + 4);
   Refused<M>(good, [](M& m) { m.world = 0; }, kRange, "Movements.world");
   Refused<M>(good, [](M& m) { m.part = 1; }, kRange, "Movements.part");
-  Refused<M>(good, [](M& m) { m.parts = 0; }, kRange, "Movements.part");
+  Refused<M>(good, [](M& m) { m.parts = 0; }, kRange, "Movements.parts");
   RefusedWhenNotFinite<M>(
       good, [](M& m) -> double& { return m.server_time_s; }, "Movements.server_time_s");
   Refused<M>(good, [](M& m) { m.avatars[1] = 0; }, kRange, "Movements.avatars", 1);
@@ -629,7 +634,8 @@ TEST(Check, LibraryPieces) {
   Refused<P>(piece, [](P& m) { m.bytes.resize(4); }, kRange, "LibraryPiece.offset", 5);
   Refused<P>(piece, [](P& m) { m.offset = 9; }, kRange, "LibraryPiece.offset", 9);
   Refused<P>(
-      piece, [](P& m) { m.total_bytes = kMaxLibraryBytes + 1; }, kRange, "LibraryPiece.offset");
+      piece, [](P& m) { m.total_bytes = kMaxLibraryBytes + 1; }, kRange,
+      "LibraryPiece.total_bytes");
   Refused<P>(
       piece,
       [](P& m) {
@@ -654,28 +660,33 @@ TEST(Check, Terrain) {
       {1, good.terrain}, [](WorldTerrain& m) { m.world = 0; }, kRange, "WorldTerrain.world");
   RefusedWhenNotFinite<T>(
       good, [](T& m) -> double& { return m.terrain->height_field->origin_m.z; },
-      "Terrain.origin_m");
+      "SetTerrain.terrain.height_field.origin_m.z");
   for (const double cell_m : {0.0, -1.0, kNaN, kInfinity}) {
     Refused<T>(
-        good, [&](T& m) { m.terrain->height_field->cell_m = cell_m; }, kRange, "Terrain.cell_m");
+        good, [&](T& m) { m.terrain->height_field->cell_m = cell_m; }, kRange,
+        "SetTerrain.terrain.height_field.cell_m");
   }
   Refused<T>(
-      good, [](T& m) { m.terrain->height_field->columns = 1; }, kRange, "Terrain.columns", 1);
+      good, [](T& m) { m.terrain->height_field->columns = 1; }, kRange,
+      "SetTerrain.terrain.height_field.columns", 1);
   Refused<T>(
-      good, [](T& m) { m.terrain->height_field->rows = 1025; }, kRange, "Terrain.rows", 1025);
+      good, [](T& m) { m.terrain->height_field->rows = 1025; }, kRange,
+      "SetTerrain.terrain.height_field.rows", 1025);
   Refused<T>(
       good, [](T& m) { m.terrain->height_field->heights_m.pop_back(); }, ErrorCode::kShapeMismatch,
-      "Terrain.heights_m", 5);
+      "SetTerrain.terrain.height_field.heights_m", 5);
   Refused<T>(
       good,
       [](T& m) { m.terrain->height_field->heights_m[4] = std::numeric_limits<float>::infinity(); },
-      kRange, "Terrain.heights_m", 4);
+      kRange, "SetTerrain.terrain.height_field.heights_m", 4);
   RefusedWhenNotFinite<T>(
-      good, [](T& m) -> double& { return m.terrain->boxes[1].height_m; }, "Terrain.boxes");
-  Refused<T>(good, [](T& m) { m.terrain->boxes[1].max_m.x = 0.0; }, kRange, "Terrain.boxes", 1);
+      good, [](T& m) -> double& { return m.terrain->boxes[1].height_m; },
+      "SetTerrain.terrain.boxes.height_m");
+  Refused<T>(
+      good, [](T& m) { m.terrain->boxes[1].max_m.x = 0.0; }, kRange, "SetTerrain.terrain.boxes", 1);
   Refused<T>(
       good, [](T& m) { m.terrain->boxes.resize(kMaxTerrainBoxes + 1, m.terrain->boxes[0]); },
-      ErrorCode::kLimitExceeded, "Terrain.boxes");
+      ErrorCode::kLimitExceeded, "SetTerrain.terrain.boxes");
 }
 
 TEST(Check, AvatarStateLandingsAndLayers) {
@@ -686,13 +697,13 @@ TEST(Check, AvatarStateLandingsAndLayers) {
       "AvatarState.movement.landings");
   Refused<S>(
       good, [](S& m) { m.movement->landings[0].foot = static_cast<FootSide>(2); },
-      ErrorCode::kMalformed, "AvatarState.movement.landings", 0);
+      ErrorCode::kMalformed, "AvatarState.movement.landings.foot", 0);
   RefusedWhenNotFinite<S>(
       good, [](S& m) -> double& { return m.movement->landings[0].position_m.y; },
-      "AvatarState.movement.landings", 0);
+      "AvatarState.movement.landings.position_m", 0);
   RefusedWhenNotFinite<S>(
       good, [](S& m) -> double& { return m.movement->landings[0].heading_rad; },
-      "AvatarState.movement.landings", 0);
+      "AvatarState.movement.landings.heading_rad", 0);
   Refused<S>(
       good, [](S& m) { m.layers.resize(kMaxPlayingLayers + 1, m.layers[0]); },
       ErrorCode::kLimitExceeded, "AvatarState.layers");
@@ -770,28 +781,34 @@ TEST(Check, Events) {
       "Events.events");
   Refused<E>(
       good, [](E& m) { m.events[1].type = static_cast<EventType>(10); }, ErrorCode::kMalformed,
-      "Event.type", 1);
-  Refused<E>(good, [](E& m) { m.events[1].avatar = 0; }, ErrorCode::kOutOfRange, "Event.avatar", 1);
+      "Events.events.type", 1);
+  Refused<E>(
+      good, [](E& m) { m.events[1].avatar = 0; }, ErrorCode::kOutOfRange, "Events.events.avatar",
+      1);
   Refused<E>(
       good, [](E& m) { m.events[1].kind = static_cast<MovementKind>(4); }, ErrorCode::kMalformed,
-      "Event.kind", 1);
-  Refused<E>(good, [](E& m) { m.events[1].group = -2; }, ErrorCode::kOutOfRange, "Event.group", 1);
+      "Events.events.kind", 1);
+  Refused<E>(
+      good, [](E& m) { m.events[1].group = -2; }, ErrorCode::kOutOfRange, "Events.events.group", 1);
   Refused<E>(
       good, [](E& m) { m.events[1].foot = static_cast<FootSide>(2); }, ErrorCode::kMalformed,
-      "Event.foot", 1);
+      "Events.events.foot", 1);
   RefusedWhenNotFinite<E>(
-      good, [](E& m) -> double& { return m.events[1].time_s; }, "Event.time_s", 1);
+      good, [](E& m) -> double& { return m.events[1].time_s; }, "Events.events.time_s", 1);
   for (int k = 0; k < 3; ++k) {
     RefusedWhenNotFinite<E>(
-        good, [k](E& m) -> double& { return m.events[1].position_m[k]; }, "Event.position_m", 1);
+        good, [k](E& m) -> double& { return m.events[1].position_m[k]; },
+        "Events.events.position_m", 1);
     RefusedWhenNotFinite<E>(
-        good, [k](E& m) -> double& { return m.events[1].base.position_m[k]; }, "Event.base", 1);
+        good, [k](E& m) -> double& { return m.events[1].base.position_m[k]; },
+        "Events.events.base_position_m", 1);
   }
   RefusedWhenNotFinite<E>(
-      good, [](E& m) -> double& { return m.events[1].base.heading_rad; }, "Event.base", 1);
+      good, [](E& m) -> double& { return m.events[1].base.heading_rad; },
+      "Events.events.base_heading_rad", 1);
   RefusedTexts<E>(
       good, [](E& m) -> std::string& { return m.events[1].reason; }, kMaxReasonBytes, true,
-      "Event.reason", 1);
+      "Events.events.reason", 1);
   const auto parameters = [&](ParameterSet Event::* set, std::string_view field) {
     const auto with = [&](auto change) {
       return [=](E& m) {
@@ -814,8 +831,8 @@ TEST(Check, Events) {
     Refused<E>(good, with([](ParameterSet& s) { s.values[1] = kNaN; }), ErrorCode::kOutOfRange,
                field, 0);
   };
-  parameters(&Event::requested, "Event.requested");
-  parameters(&Event::applied, "Event.applied");
+  parameters(&Event::requested, "Events.events.requested");
+  parameters(&Event::applied, "Events.events.applied");
 }
 
 TEST(Encoder, RejectsAPayloadOverItsCap) {

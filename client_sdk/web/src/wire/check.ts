@@ -4,9 +4,9 @@ import type {
 } from '../types';
 import {footChoices, interrupts, movementTypes, poseDetails, poseModes, roles} from './decode';
 import {
-  maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes, maxRateRings, maxTerrainBoxes,
+  maxEveryNTicks, maxItems, maxNameBytes, maxRateRings, maxTerrainBoxes,
   maxTerrainColumns, maxWaypoints
-} from './limits';
+} from '../../generated/limits';
 import {Malformed} from './malformed';
 import type {
   CancelQueue, JoinWorld, LayerEntry, Observe, RegionEntry, Remove, Request, SetLayers,
@@ -20,6 +20,7 @@ import {checkName} from './text';
  * argument is invalid.
  */
 
+export const maxAvatarNumber = 0xffff_ffff;
 const maxRequestId = 0xffff_ffff_ffff_ffffn;
 
 function finite(value: unknown, field: string, index: number): number {

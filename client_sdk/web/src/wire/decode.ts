@@ -6,14 +6,14 @@ import type {
   ParameterName, Parameters, PlayingLayer, PoseDetail, PoseMode, QueuedRequest, Role, Terrain,
   TerrainBox, Vec3, WorldEvent, WorldEventType
 } from '../types';
-import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
+import {frameHeaderBytes, isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
-  frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
+  maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
   maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLandings, maxLayerNames,
   maxLibraryBytes, maxNameBytes, maxParameters, maxPieceBytes, maxPlayingLayers, maxRateRings,
   maxReasonBytes, maxRecordBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns,
   maxTextBytes, maxWaypoints, maxWeights, minResumeTokenBytes
-} from './limits';
+} from '../../generated/limits';
 import {Malformed} from './malformed';
 import type {
   Joint, LayerEntry, Message, RegionEntry, ReplyEntry, RotationCode, SpawnEntry

@@ -2,7 +2,7 @@ import {Builder} from 'flatbuffers';
 import * as wire from '../../generated/wire';
 import {footChoices, interrupts, movementTypes, poseDetails, poseModes, roles} from './decode';
 import {makeFrame, maxPayloadBytes} from './frame';
-import {maxBulkBytes, maxControlBytes} from './limits';
+import {maxBulkBytes, maxControlBytes} from '../../generated/limits';
 import {Malformed} from './malformed';
 import type {Terrain} from '../types';
 import type {ClientMessage, RegionEntry} from './messages';

@@ -1,4 +1,4 @@
-import {frameHeaderBytes, maxBulkBytes, maxControlBytes, maxHelloBytes} from './limits';
+import {maxBulkBytes, maxControlBytes, maxHelloBytes} from '../../generated/limits';
 import {Malformed} from './malformed';
 
 /** Numbers of the message types. */
@@ -35,6 +35,7 @@ export const MessageType = {
 export type MessageName = keyof typeof MessageType;
 export type Sender = 'client' | 'server';
 
+export const frameHeaderBytes = 16;
 const magic = 0x1a505753;  // "SWP", 0x1a
 const frameVersion = 1;
 

@@ -1,5 +1,5 @@
 import {tableLayouts} from '../../generated/layout';
-import {maxDepth} from './limits';
+import {maxDepth} from '../../generated/limits';
 
 /**
  * Returns true if a FlatBuffers message can be read safely. All data reachable from the root must

@@ -8,43 +8,9 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/protocol/limits.h"
+#include "stridewire/protocol/message_type.h"
 
 namespace stridewire::protocol {
-
-/// Message types in the frame header. Numbers are never reused.
-enum class MessageType : std::uint16_t {
-  // Messages from client to server.
-  kHello = 1,
-  kJoinWorld = 2,
-  kLeaveWorld = 3,
-  kSpawn = 4,
-  kRemove = 5,
-  kRequest = 6,
-  kCancelQueue = 7,
-  kObserve = 8,
-  kStopObserving = 9,
-  kPing = 10,
-  kInspectAvatar = 11,
-  kSetTerrain = 12,
-  kSetLayers = 13,
-  kSetPlanting = 14,
-  kFetchLibrary = 15,
-  // Messages in both directions.
-  kGoodbye = 32,
-  // Messages from server to client.
-  kWelcome = 64,
-  kWorldInfo = 65,
-  kReply = 66,
-  kPoseBatch = 67,
-  kEvents = 68,
-  kLagging = 69,
-  kError = 70,
-  kPong = 71,
-  kAvatarState = 72,
-  kWorldTerrain = 73,
-  kMovements = 74,
-  kLibraryPiece = 75,
-};
 
 /// Side that sent a frame.
 enum class Sender : std::uint8_t { kClient, kServer };

@@ -1,0 +1,277 @@
+"""Writes the C++ code of the protocol: limits, message types, checks, decoding and encoding."""
+
+HEAD = "// Generated from {schema} by protocol/generator. Do not edit.\n"
+CPP_INTEGERS = {"ubyte": "std::uint8_t", "ushort": "std::uint16_t", "uint": "std::uint32_t",
+                "ulong": "std::size_t", "int": "int"}
+
+
+def camel(name):
+    """max_items -> MaxItems"""
+    return "".join(word.capitalize() for word in name.split("_"))
+
+
+def grouped(number):
+    """Formats a bound for an error text: 65536 -> 65,536."""
+    return f"{int(number):,}" if number == int(number) else str(number)
+
+
+class Cpp:
+    def __init__(self, schema):
+        self.schema = schema
+
+    # ---- names and expressions
+
+    def type_name(self, type_name):
+        """The C++ type of the message structs for a table, struct or enum."""
+        declared = self.schema.tables.get(type_name) or self.schema.enums[type_name]
+        return declared.attributes.get("native") or declared.attributes.get("cpp") or type_name
+
+    def member(self, f):
+        path = f.get("cpp", f.name)
+        return "m" if path == "." else f"m.{path}"
+
+    def bound(self, value):
+        return f"k{camel(value)}" if value in self.schema.limits else value
+
+    def text_of(self, value):
+        return grouped(self.schema.number(value))
+
+    def bounds(self, f):
+        """Bounds of the length of a list or text, with the text of the error."""
+        unit = "bytes" if f.type == "string" or "bytes" in f else "entries"
+        low = f.get("min", "0")
+        expected = (f"expected {self.text_of(low)} to " if low != "0" else "expected at most ")
+        expected += f"{self.text_of(f.get('max'))} {unit}"
+        return f'{{{self.bound(low)}, {self.bound(f.get("max"))}, "{expected}"}}'
+
+    def at(self, f):
+        return "at" if f.get("cpp") == "." else f'At(at, "{f.name}")'
+
+    def is_float(self, f):
+        return f.type in ("float", "double")
+
+    # ---- checks
+
+    def number_check(self, f, value):
+        at = self.at(f)
+        if f.type in self.schema.enums:
+            last = f.get("max") or list(self.schema.enums[f.type].values)[-1]
+            number = self.schema.enums[f.type].values[last]
+            return f'found.Known({value}, {number}, {at}, "expected a number from 0 to {number}");'
+        if "nonzero" in f:
+            return f"found.NonZero({value}, {at});"
+        above, below, low, high = (f.get(name) for name in ("above", "below", "min", "max"))
+        if self.is_float(f):
+            if above is not None:
+                return f'found.Above({value}, {above}, {at}, "expected a number above {above}");'
+            if low is not None:
+                expected = f"expected a number of at least {low}"
+                return f'found.AtLeast({value}, {low}, {at}, "{expected}");'
+            return f"found.Finite({value}, {at});"
+        if low is not None and high is not None:
+            expected = f"expected {self.text_of(low)} to {self.text_of(high)}"
+            return (f'found.That({value} >= {self.bound(low)} && {value} <= {self.bound(high)}, '
+                    f'{at}, {value}, "{expected}");')
+        for value_of, sign, words in ((low, ">=", "at least"), (high, "<=", "at most"),
+                                      (below, "<", "a number below")):
+            if value_of is not None:
+                return (f'found.That({value} {sign} {self.bound(value_of)}, {at}, {value}, '
+                        f'"expected {words} {self.text_of(value_of)}");')
+        return None
+
+    def check(self, f):
+        m, at = self.member(f), self.at(f)
+        if f.is_list:
+            if f.type in self.schema.tables:
+                return [f"CheckList(found, {m}, {self.bounds(f)}, {at});"]
+            lines = [f"found.Count({m}.size(), {self.bounds(f)}, {at});"]
+            if self.is_float(f):
+                lines.append(f"found.FiniteEntries({m}, {at});")
+            if "nonzero" in f:
+                lines.append(f"found.NonZeroEntries({m}, {at});")
+            if enum := f.get("enumerators"):
+                last = len(self.schema.enums[enum].values) - 1
+                expected = f"expected numbers from 0 to {last}"
+                lines.append(f'found.KnownEntries({m}, {last}, {at}, "{expected}");')
+            return lines
+        if f.type == "string":
+            return [f"found.Text({m}, {self.bounds(f)}, {at});"]
+        if f.type in self.schema.tables:
+            if "optional" in f:
+                return [f"if ({m}) CheckFields(found, {at}, *{m});"]
+            return [f"CheckFields(found, {at}, {m});"]
+        if f.default == "null":
+            return [f"if ({m}) {self.number_check(f, '*' + m)}"]
+        line = None if f.type == "bool" or "status" in f else self.number_check(f, m)
+        return [line] if line else []
+
+    def check_function(self, table):
+        lines = [line for f in table.fields for line in self.check(f)]
+        if "meaning" in table:
+            lines.append("if (found.ok()) CheckMeaning(found, at, m);")
+        return self.function(f"void CheckFields(Findings& found, const FieldPath& at, "
+                             f"const {self.type_name(table.name)}& m)", lines)
+
+    # ---- decoding
+
+    def unpack(self, f, in_struct):
+        m, at, w = self.member(f), self.at(f), f"w.{f.name}()"
+        if f.is_list:
+            name = "UnpackList" if f.type in self.schema.tables else "u.Entries"
+            first = "u, " if f.type in self.schema.tables else ""
+            return f"{name}({first}{w}, {self.bounds(f)}, {at}, {m});"
+        if f.type == "string":
+            return f"u.CopyText({w}, {self.bounds(f)}, {at}, {m});"
+        if f.type in self.schema.tables:
+            if in_struct:
+                return f"Unpack(u, {at}, {w}, {m});"
+            target = f"{m}.emplace()" if "optional" in f else m
+            return f"if (const auto* from = {w}) Unpack(u, {at}, *from, {target});"
+        if "inverted" in f:
+            return f"{m} = !{w};"
+        if f.type in self.schema.enums:
+            return f"{m} = static_cast<{self.type_name(f.type)}>({w});"
+        return f"{m} = static_cast<StatusCode>({w});" if "status" in f else f"{m} = {w};"
+
+    def unpack_function(self, table):
+        lines = [self.unpack(f, table.is_struct) for f in table.fields]
+        return self.function(f"void Unpack([[maybe_unused]] Unpacker& u, "
+                             f"[[maybe_unused]] const FieldPath& at, const wire::{table.name}& w, "
+                             f"{self.type_name(table.name)}& m)", lines)
+
+    # ---- encoding
+
+    def wire_scalar(self, f):
+        m = self.member(f)
+        if f.type in self.schema.enums:
+            return f"static_cast<wire::{f.type}>({m})"
+        if "status" in f:
+            return f"static_cast<std::uint16_t>({m})"
+        return f"!{m}" if "inverted" in f else m
+
+    def build_early(self, f):
+        m = self.member(f)
+        if f.is_list:
+            return f"const auto {f.name}_entries = Entries(b, {m});"
+        return f"const auto {f.name} = Build(b, {m});"
+
+    def build(self, f):
+        """A statement that builds a field which is stored by offset, or a struct; else None."""
+        m = self.member(f)
+        keep = "true" if "keep_empty" in f else "false"
+        if f.is_list:
+            if f.type in self.schema.tables and not self.schema.is_struct(f.type):
+                entries = f"{f.name}_entries" if "early" in f else f"Entries(b, {m})"
+                return f"const auto {f.name} = TableList(b, {entries}, {keep});"
+            kind = "StructList" if f.type in self.schema.tables else "ScalarList"
+            return f"const auto {f.name} = {kind}(b, {m}, {keep});"
+        if f.type == "string":
+            return f"const auto {f.name} = {'SharedText' if 'shared' in f else 'Text'}(b, {m});"
+        if f.type in self.schema.tables:
+            if self.schema.is_struct(f.type):
+                return f"const wire::{f.type} {f.name} = ToWire({m});"
+            if "early" in f:
+                return None
+            if "optional" in f:
+                return f"const auto {f.name} = {m} ? Build(b, *{m}) : Offset<wire::{f.type}>();"
+            return self.build_early(f)
+        return None
+
+    def argument(self, f):
+        if f.is_list or f.type == "string":
+            return f.name
+        if self.schema.is_struct(f.type):
+            if "omit_zero" in f:
+                return f"IsZero({self.member(f)}) ? nullptr : &{f.name}"
+            return f"&{f.name}"
+        return f.name if f.type in self.schema.tables else self.wire_scalar(f)
+
+    def build_function(self, table):
+        lines = [self.build_early(f) for f in table.fields if "early" in f]
+        lines += [line for f in table.fields if (line := self.build(f))]
+        if "in_order" in table:
+            lines.append(f"wire::{table.name}Builder builder(b);")
+            for f in table.fields:
+                condition = f"if ({self.member(f)}) " if f.default == "null" else ""
+                value = "*" + self.member(f) if condition else self.argument(f)
+                lines.append(f"{condition}builder.add_{f.name}({value});")
+            lines.append("return builder.Finish();")
+        else:
+            arguments = ", ".join(["b"] + [self.argument(f) for f in table.fields])
+            lines.append(f"return wire::Create{table.name}({arguments});")
+        return self.function(self.build_signature(table), lines)
+
+    def build_signature(self, table):
+        argument = f"const {self.type_name(table.name)}& m"
+        if table.is_struct:
+            return f"wire::{table.name} ToWire({argument})"
+        return f"Offset<wire::{table.name}> Build(FlatBufferBuilder& b, {argument})"
+
+    def to_wire_function(self, table):
+        arguments = ", ".join(f"ToWire({self.member(f)})" if f.type in self.schema.tables
+                              else self.wire_scalar(f) for f in table.fields)
+        return self.function(self.build_signature(table), [f"return {{{arguments}}};"])
+
+    # ---- files
+
+    def function(self, signature, lines):
+        body = "".join(f"  {line}\n" for line in lines)
+        return f"{signature} {{\n{body}}}\n"
+
+    def head(self):
+        return HEAD.format(schema=self.schema.path)
+
+    def limits_header(self):
+        lines = []
+        for f in self.schema.limits.values():
+            lines += [f"/// {line}" for line in f.doc]
+            lines.append(f"inline constexpr {CPP_INTEGERS[f.type]} k{camel(f.name)} = {f.default};")
+        return (self.head() + "#pragma once\n\n#include <cstddef>\n#include <cstdint>\n\n"
+                "namespace stridewire::protocol {\n\n" + "\n".join(lines) +
+                "\n\n}  // namespace stridewire::protocol\n")
+
+    def message_type_header(self):
+        values = "".join(f"  k{m.name} = {m.get('message')},\n" for m in self.schema.messages)
+        return (self.head() + "#pragma once\n\n#include <cstdint>\n\n"
+                "namespace stridewire::protocol {\n\n"
+                "/// Message types in the frame header. Numbers are never reused.\n"
+                f"enum class MessageType : std::uint16_t {{\n{values}}};\n\n"
+                "}  // namespace stridewire::protocol\n")
+
+    def message_list(self):
+        """An X macro over all messages: struct, name on the wire, senders, whether it is bulk."""
+        rows = " \\\n".join(
+            f"  X({self.type_name(m.name)}, {m.name}, {str(m.get('sender') != 'server').lower()}, "
+            f"{str(m.get('sender') != 'client').lower()}, {str('bulk' in m).lower()})"
+            for m in self.schema.messages)
+        return (self.head() + "#pragma once\n\n"
+                "// X(struct, name, the client sends it, the server sends it, it is bulk)\n"
+                f"#define STRIDEWIRE_MESSAGES(X) \\\n{rows}\n")
+
+    def codec_header(self):
+        lines = []
+        for t in self.schema.tables.values():
+            if "native" in t:
+                continue
+            name = self.type_name(t.name)
+            checks = ["CheckFields", "CheckMeaning"] if "meaning" in t else ["CheckFields"]
+            lines += [f"void {check}(Findings& found, const FieldPath& at, const {name}& m);"
+                      for check in checks]
+            lines += [f"void Unpack(Unpacker& u, const FieldPath& at, const wire::{t.name}& w, "
+                      f"{name}& m);", f"[[nodiscard]] {self.build_signature(t)};"]
+        return (self.head() + "#pragma once\n\nnamespace stridewire::protocol {\n\n" +
+                "\n".join(lines) + "\n\n}  // namespace stridewire::protocol\n")
+
+    def codec_source(self):
+        parts = []
+        for t in self.schema.tables.values():
+            if "native" in t:
+                continue
+            if not t.by_hand("check"):
+                parts.append(self.check_function(t))
+            if not t.by_hand("decode"):
+                parts.append(self.unpack_function(t))
+            if not t.by_hand("encode"):
+                parts.append(self.to_wire_function(t) if t.is_struct else self.build_function(t))
+        return (self.head() + '#include "codec_support.h"\n\nnamespace stridewire::protocol {\n\n' +
+                "\n".join(parts) + "\n}  // namespace stridewire::protocol\n")

@@ -1,0 +1,54 @@
+#!/usr/bin/env python3
+"""Generates code from the schema of the protocol: generate.py SCHEMA KIND FOLDER.
+
+KIND is one of:
+  cpp   limits.h, message_type.h, message_list.h, codec.h and codec.cpp
+  json  fields_json.h and fields_json.cpp, for the test vectors
+  web   limits.ts and layout.ts, for the web client
+
+Files that would not change are left alone, so that nothing is compiled again.
+"""
+
+import pathlib
+import sys
+
+from cpp import Cpp
+from cpp_json import CppJson
+from schema import Schema, SchemaError
+from typescript import TypeScript
+
+
+def files(schema, kind):
+    if kind == "cpp":
+        cpp = Cpp(schema)
+        return {"include/stridewire/protocol/limits.h": cpp.limits_header(),
+                "include/stridewire/protocol/message_type.h": cpp.message_type_header(),
+                "message_list.h": cpp.message_list(),
+                "codec.h": cpp.codec_header(),
+                "codec.cpp": cpp.codec_source()}
+    if kind == "json":
+        json = CppJson(schema)
+        return {"fields_json.h": json.header(), "fields_json.cpp": json.source()}
+    if kind == "web":
+        web = TypeScript(schema)
+        return {"limits.ts": web.limits(), "layout.ts": web.layout()}
+    sys.exit(f"generate.py: unknown kind '{kind}'\n{__doc__}")
+
+
+def main():
+    if len(sys.argv) != 4:
+        sys.exit(__doc__)
+    path, kind, folder = sys.argv[1:]
+    try:
+        schema = Schema(pathlib.Path(path).name, pathlib.Path(path).read_text(encoding="utf-8"))
+    except (OSError, SchemaError) as error:
+        sys.exit(f"generate.py: {error}")
+    for name, text in files(schema, kind).items():
+        out = pathlib.Path(folder) / name
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if not out.exists() or out.read_text(encoding="utf-8") != text:
+            out.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,222 @@
+"""Reads the subset of the FlatBuffers schema language that protocol/schema uses.
+
+Every declaration knows its line, so that errors name file, line and field. The generator checks the
+attributes itself, because flatc accepts every declared attribute anywhere.
+"""
+
+import re
+from dataclasses import dataclass, field
+
+# Sizes in bytes.
+SCALARS = {"bool": 1, "byte": 1, "ubyte": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4,
+           "float": 4, "long": 8, "ulong": 8, "double": 8}
+
+TABLE_ATTRIBUTES = {
+    "bulk", "cpp", "handwritten", "in_order", "meaning", "message", "native", "sender",
+}
+FIELD_ATTRIBUTES = {
+    "above", "below", "bytes", "cpp", "deprecated", "early", "enumerators", "inverted",
+    "json_array", "json_omit", "json_place", "keep_empty", "max", "min", "nonzero", "omit_zero",
+    "optional", "shared", "status",
+}
+ENUM_ATTRIBUTES = {"cpp"}
+
+
+class SchemaError(Exception):
+    """A schema that the generator cannot use. The text begins with "file:line: "."""
+
+
+@dataclass
+class Enum:
+    name: str
+    attributes: dict
+    line: int
+    values: dict = field(default_factory=dict)
+
+
+@dataclass
+class Field:
+    name: str
+    type: str  # Name of the type; of the entries if is_list.
+    is_list: bool
+    default: str | None
+    attributes: dict
+    line: int
+    doc: list
+
+    def __contains__(self, attribute):
+        return attribute in self.attributes
+
+    def get(self, attribute, default=None):
+        return self.attributes.get(attribute, default)
+
+
+@dataclass
+class Table:
+    """A table, or a struct if is_struct."""
+
+    name: str
+    is_struct: bool
+    attributes: dict
+    line: int
+    all_fields: list = field(default_factory=list)  # Deprecated ones included: the wire layout.
+
+    def __contains__(self, attribute):
+        return attribute in self.attributes
+
+    def get(self, attribute, default=None):
+        return self.attributes.get(attribute, default)
+
+    @property
+    def fields(self):
+        return [f for f in self.all_fields if "deprecated" not in f]
+
+    def by_hand(self, what):
+        return what in self.get("handwritten", "").split()
+
+
+class Schema:
+    def __init__(self, path, text):
+        self.path = path
+        self.enums = {}
+        self.tables = {}
+        self.limits = {}  # Name of a limit: its Field.
+        self._parse(text)
+        if "Limits" in self.tables:
+            self.limits = {f.name: f for f in self.tables.pop("Limits").all_fields}
+        self._check()
+
+    def fail(self, line, text):
+        raise SchemaError(f"{self.path}:{line}: {text}")
+
+    @property
+    def messages(self):
+        """Tables that are messages, in the order of the schema."""
+        return [t for t in self.tables.values() if "message" in t]
+
+    def number(self, value):
+        """The value of a bound: a number, or the name of a limit."""
+        return int(self.limits[value].default) if value in self.limits else float(value)
+
+    def is_struct(self, type_name):
+        return type_name in self.tables and self.tables[type_name].is_struct
+
+    def inline_layout(self, type_name):
+        """Size and alignment of a type that is stored inline, or None for an offset."""
+        if type_name in self.enums:
+            return 1, 1
+        if type_name in SCALARS:
+            return SCALARS[type_name], SCALARS[type_name]
+        if not self.is_struct(type_name):
+            return None
+        size, align = 0, 1
+        for part in self.tables[type_name].all_fields:
+            part_size, part_align = self.inline_layout(part.type)
+            size = -(-size // part_align) * part_align + part_size
+            align = max(align, part_align)
+        return -(-size // align) * align, align
+
+    # ---- parsing
+
+    def _parse(self, text):
+        doc = []
+        body = None  # The declaration whose braces are open.
+        statement, start = "", 0
+        for line, raw in enumerate(text.split("\n"), 1):
+            if match := re.match(r"\s*///\s?(.*)", raw):
+                doc.append(match[1])
+                continue
+            for part in re.split(r"([{};])", re.sub(r"//.*", "", raw)):
+                if part not in ("{", "}", ";"):
+                    start = start if statement.strip() else line
+                    statement += part + " "
+                    continue
+                words, statement = statement.strip(), ""
+                if part == "{":
+                    body = self._declaration(words, start)
+                elif part == ";" or isinstance(body, Enum):
+                    self._statement(body, words, start, doc)
+                elif words:
+                    self.fail(start, f"expected ';' after '{words}'")
+                body = None if part == "}" else body
+                doc = []
+        if statement.strip() or body:
+            self.fail(start, "the declaration does not end")
+
+    def _attributes(self, text, allowed, line, where):
+        attributes = {}
+        for part in re.findall(r'(?:[^,"]|"[^"]*")+', text or ""):
+            match = re.fullmatch(r'\s*(\w+)\s*(?::\s*"([^"]*)")?\s*', part)
+            if not match:
+                self.fail(line, f"{where}: cannot read the attribute '{part.strip()}'")
+            if match[1] not in allowed:
+                self.fail(line, f"{where}: unknown attribute '{match[1]}'; expected one of "
+                                f"{', '.join(sorted(allowed))}")
+            attributes[match[1]] = match[2] or ""
+        return attributes
+
+    def _declaration(self, text, line):
+        match = re.fullmatch(r"(table|struct|enum)\s+(\w+)\s*(?::\s*(\w+)\s*)?(?:\((.*)\))?",
+                             text, re.S)
+        if not match:
+            self.fail(line, f"expected a table, struct or enum, got '{text}'")
+        kind, name, base, attributes = match.groups()
+        if kind == "enum":
+            if base != "ubyte":
+                self.fail(line, f"enum {name}: expected the type ubyte, got '{base}'")
+            attributes = self._attributes(attributes, ENUM_ATTRIBUTES, line, f"enum {name}")
+            return self.enums.setdefault(name, Enum(name, attributes, line))
+        attributes = self._attributes(attributes, TABLE_ATTRIBUTES, line, f"{kind} {name}")
+        return self.tables.setdefault(name, Table(name, kind == "struct", attributes, line))
+
+    def _statement(self, body, text, line, doc):
+        if body is None:
+            if not re.fullmatch(r'namespace\s+[\w.]+|attribute\s+"\w+"', text):
+                self.fail(line, f"expected a declaration, got '{text}'")
+        elif isinstance(body, Enum):
+            for position, value in enumerate(filter(None, map(str.strip, text.split(",")))):
+                match = re.fullmatch(r"(\w+)\s*=\s*(\d+)", value)
+                if not match or int(match[2]) != position:
+                    self.fail(line, f"enum {body.name}: expected '{position}' for the value "
+                                    f"number {position}, got '{value}'")
+                body.values[match[1]] = position
+        else:
+            match = re.fullmatch(r"(\w+)\s*:\s*(\[)?\s*(\w+)\s*\]?\s*(?:=\s*([-\w.]+)\s*)?"
+                                 r"(?:\((.*)\))?", text, re.S)
+            if not match:
+                self.fail(line, f"{body.name}: cannot read the field '{text}'")
+            name, is_list, type_name, default, attributes = match.groups()
+            attributes = self._attributes(attributes, FIELD_ATTRIBUTES, line, f"{body.name}.{name}")
+            body.all_fields.append(
+                Field(name, type_name, bool(is_list), default, attributes, line, doc))
+
+    # ---- checks of what was read
+
+    def _check(self):
+        for table in self.tables.values():
+            for f in table.all_fields:
+                self._check_field(f, f"{table.name}.{f.name}")
+
+    def _check_field(self, f, where):
+        is_object = f.type in self.tables
+        if not (f.type in SCALARS or f.type in self.enums or is_object or f.type == "string"):
+            self.fail(f.line, f"{where}: unknown type '{f.type}'")
+        if f.is_list and f.type == "string":
+            self.fail(f.line, f"{where}: lists of strings are not supported")
+        # Without an upper bound a small frame could decode to any amount of memory.
+        if (f.is_list or f.type == "string") and "max" not in f:
+            self.fail(f.line, f"{where}: a list or text needs the attribute 'max'")
+        if is_object and not f.is_list and ("min" in f or "max" in f):
+            self.fail(f.line, f"{where}: 'min' and 'max' do not apply to a table or struct")
+        if f.get("enumerators") and f.get("enumerators") not in self.enums:
+            self.fail(f.line, f"{where}: unknown enum '{f.get('enumerators')}'")
+        for bound in ("min", "max", "above", "below"):
+            value = f.get(bound)
+            if value is None:
+                continue
+            if f.type in self.enums and not f.is_list:
+                if value not in self.enums[f.type].values:
+                    self.fail(f.line, f"{where}: {bound}: {f.type} has no enumerator '{value}'")
+            elif value not in self.limits and not re.fullmatch(r"-?\d+(\.\d+)?", value):
+                self.fail(f.line, f"{where}: {bound}: expected a number or a field of Limits, "
+                                  f"got '{value}'")

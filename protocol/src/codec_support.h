@@ -1,0 +1,121 @@
+#pragma once
+
+#include <flatbuffers/flatbuffers.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "findings.h"
+#include "stridewire/protocol/messages.h"
+#include "stridewire_generated.h"
+#include "unpacker.h"
+
+namespace stridewire::protocol {
+
+using flatbuffers::FlatBufferBuilder;
+using flatbuffers::Offset;
+
+}  // namespace stridewire::protocol
+
+#include "codec.h"
+
+/// What the generated code (codec.cpp) uses: conversions of the types of core and GLM, and lists.
+/// The schema's attributes name the cases; protocol/generator/README.md explains them.
+namespace stridewire::protocol {
+
+// ---- vectors and quaternions
+
+inline wire::Vec3 ToWire(const DVec3& v) { return {v.x, v.y, v.z}; }
+inline wire::Offset ToWire(const Vec3& v) { return {v.x, v.y, v.z}; }
+inline wire::Rotation ToWire(const Quat& q) { return {q.x, q.y, q.z, q.w}; }
+inline bool IsZero(const DVec3& v) { return v == DVec3(0.0); }
+
+inline void Unpack(Unpacker&, const FieldPath&, const wire::Vec3& w, DVec3& v) {
+  v = DVec3(w.x(), w.y(), w.z());
+}
+inline void Unpack(Unpacker&, const FieldPath&, const wire::Offset& w, Vec3& v) {
+  v = Vec3(w.x(), w.y(), w.z());
+}
+inline void Unpack(Unpacker&, const FieldPath&, const wire::Rotation& w, Quat& q) {
+  q = Quat(w.w(), w.x(), w.y(), w.z());
+}
+
+inline void CheckFields(Findings& found, const FieldPath& at, const DVec3& v) {
+  found.AreFinite(at, v.x, v.y, v.z);
+}
+inline void CheckFields(Findings& found, const FieldPath& at, const Vec3& v) {
+  found.AreFinite(at, v.x, v.y, v.z);
+}
+inline void CheckFields(Findings& found, const FieldPath& at, const Quat& q) {
+  found.AreFinite(at, q.x, q.y, q.z, q.w);
+}
+
+// ---- lists
+
+void CheckList(Findings& found, const ParameterSet& set, const Bounds& bounds, const FieldPath& at);
+template <typename T>
+void CheckList(Findings& found, const std::vector<T>& list, const Bounds& bounds,
+               const FieldPath& at) {
+  found.Count(list.size(), bounds, at);
+  for (std::size_t i = 0; i < list.size(); ++i) CheckFields(found, Entry(at, i), list[i]);
+}
+
+using WireParameters = flatbuffers::Vector<const wire::ParameterValue*>;
+void UnpackList(Unpacker& u, const WireParameters* list, const Bounds& bounds, const FieldPath& at,
+                ParameterSet& out);
+template <typename W, typename T>
+void UnpackList(Unpacker& u, const flatbuffers::Vector<W>* list, const Bounds& bounds,
+                const FieldPath& at, std::vector<T>& out) {
+  out.resize(u.CountOf(list, bounds, at));
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    Unpack(u, Entry(at, i), *list->Get(static_cast<flatbuffers::uoffset_t>(i)), out[i]);
+  }
+}
+
+// Empty texts and lists are omitted, unless `keep_empty` is true.
+
+inline Offset<flatbuffers::String> Text(FlatBufferBuilder& b, const std::string& text) {
+  return text.empty() ? Offset<flatbuffers::String>() : b.CreateString(text);
+}
+/// For texts that thousands of items of a message can have. Equal texts are stored once.
+inline Offset<flatbuffers::String> SharedText(FlatBufferBuilder& b, const std::string& text) {
+  return text.empty() ? Offset<flatbuffers::String>() : b.CreateSharedString(text);
+}
+
+/// Builds a list of numbers, enums or bytes.
+template <typename T>
+auto ScalarList(FlatBufferBuilder& b, const std::vector<T>& list, bool keep_empty) {
+  using Number = std::conditional_t<std::is_arithmetic_v<T>, T, std::uint8_t>;
+  static_assert(sizeof(Number) == sizeof(T));
+  if (list.empty() && !keep_empty) return Offset<flatbuffers::Vector<Number>>();
+  return b.CreateVector(reinterpret_cast<const Number*>(list.data()), list.size());
+}
+
+Offset<WireParameters> StructList(FlatBufferBuilder& b, const ParameterSet& set, bool keep_empty);
+template <typename T>
+auto StructList(FlatBufferBuilder& b, const std::vector<T>& list, bool keep_empty) {
+  using Wire = decltype(ToWire(std::declval<const T&>()));
+  if (list.empty() && !keep_empty) return Offset<flatbuffers::Vector<const Wire*>>();
+  std::vector<Wire> structs;
+  structs.reserve(list.size());
+  for (const T& entry : list) structs.push_back(ToWire(entry));
+  return b.CreateVectorOfStructs(structs);
+}
+
+/// Builds the tables of a list, which TableList combines.
+template <typename T>
+auto Entries(FlatBufferBuilder& b, const std::vector<T>& list) {
+  std::vector<decltype(Build(b, list[0]))> entries;
+  entries.reserve(list.size());
+  for (const T& entry : list) entries.push_back(Build(b, entry));
+  return entries;
+}
+template <typename T>
+auto TableList(FlatBufferBuilder& b, const std::vector<Offset<T>>& entries, bool keep_empty) {
+  if (entries.empty() && !keep_empty) return Offset<flatbuffers::Vector<Offset<T>>>();
+  return b.CreateVector(entries);
+}
+
+}  // namespace stridewire::protocol

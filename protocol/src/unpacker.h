@@ -1,0 +1,58 @@
+#pragma once
+
+#include <flatbuffers/flatbuffers.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "findings.h"
+
+namespace stridewire::protocol {
+
+/// Copies a message from verified bytes. It checks lengths before it copies, because many
+/// FlatBuffers offsets can refer to the same bytes, so that the decoded message is larger than its
+/// payload.
+class Unpacker : public Findings {
+ public:
+  /// Returns the number of entries to read. Without a list it is 0. A list that is too long or not
+  /// aligned is an error and also yields 0.
+  template <typename T>
+  std::size_t CountOf(const flatbuffers::Vector<T>* list, const Bounds& bounds,
+                      const FieldPath& at) {
+    if (list == nullptr) return 0;
+    // The verifier checks only the alignment of the length field, which is 4 bytes.
+    if (reinterpret_cast<std::uintptr_t>(list->Data()) % alignof(std::remove_pointer_t<T>) != 0) {
+      Wrong(ErrorCode::kMalformed, "the list is not aligned", at);
+      return 0;
+    }
+    if (list->size() <= bounds.max) return list->size();
+    Wrong(ErrorCode::kLimitExceeded, bounds.expected, at, list->size());
+    return 0;
+  }
+
+  void CopyText(const flatbuffers::String* text, const Bounds& bounds, const FieldPath& at,
+                std::string& out) {
+    if (text == nullptr) return;
+    if (text->size() > bounds.max) {
+      Wrong(ErrorCode::kLimitExceeded, bounds.expected, at, text->size());
+      return;
+    }
+    out.assign(text->data(), text->size());
+  }
+
+  /// Copies a list of numbers. `T` is a number, an enum or std::byte of the same size.
+  template <typename W, typename T>
+  void Entries(const flatbuffers::Vector<W>* list, const Bounds& bounds, const FieldPath& at,
+               std::vector<T>& out) {
+    static_assert(sizeof(W) == sizeof(T));
+    if (const std::size_t count = CountOf(list, bounds, at); count > 0) {
+      const auto* data = reinterpret_cast<const T*>(list->data());
+      out.assign(data, data + count);
+    }
+  }
+};
+
+}  // namespace stridewire::protocol

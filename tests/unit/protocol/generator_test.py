@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""Tests of protocol/generator on small schemas: generator_test.py ROOT."""
+
+import pathlib
+import sys
+import unittest
+
+ROOT = pathlib.Path(sys.argv.pop(1))
+sys.path.insert(0, str(ROOT / "protocol" / "generator"))
+
+from cpp import Cpp  # noqa: E402
+from cpp_json import CppJson  # noqa: E402
+from schema import Schema, SchemaError  # noqa: E402
+from typescript import TypeScript  # noqa: E402
+
+SMALL = """
+namespace test;
+attribute "max";
+table Limits {
+  /// Items per message.
+  max_items: ulong = 65536;
+}
+enum Color: ubyte { Red = 0, Green = 1 }
+struct Point { x: double; z: float; }
+table Item { avatar: uint (nonzero); speed_m_s: double = null (min: "0"); }
+// A comment; with a semicolon.
+table Paint (message: "7", sender: "client", bulk) {
+  seq: ulong (nonzero);
+  old: uint (deprecated);
+  color: Color;
+  text: string (max: "16");
+  items: [Item] (min: "1", max: "max_items");
+  hidden: bool (cpp: "visible", inverted);
+  place: Point;
+}
+"""
+
+
+def read(text):
+    return Schema("small.fbs", text)
+
+
+class SchemaTest(unittest.TestCase):
+    def test_reads_tables_structs_enums_and_limits(self):
+        schema = read(SMALL)
+        self.assertEqual([m.name for m in schema.messages], ["Paint"])
+        self.assertEqual(schema.enums["Color"].values, {"Red": 0, "Green": 1})
+        self.assertEqual(schema.limits["max_items"].doc, ["Items per message."])
+        paint = schema.tables["Paint"]
+        self.assertEqual([f.name for f in paint.fields],
+                         ["seq", "color", "text", "items", "hidden", "place"])
+        self.assertEqual(len(paint.all_fields), 7)
+        self.assertTrue(paint.fields[3].is_list)
+        self.assertEqual(paint.fields[3].attributes, {"min": "1", "max": "max_items"})
+
+    def test_lays_out_structs_with_padding(self):
+        schema = read(SMALL)
+        self.assertEqual(schema.inline_layout("Point"), (16, 8))
+        self.assertEqual(schema.inline_layout("Color"), (1, 1))
+        self.assertIsNone(schema.inline_layout("Item"))
+
+    def test_errors_name_file_line_and_field(self):
+        cases = {
+            "table A {\n  x: uint (nonzer);\n}": "small.fbs:2: A.x: unknown attribute 'nonzer'",
+            "table A (masage: \"1\") { x: uint; }":
+                "small.fbs:1: table A: unknown attribute 'masage'",
+            "\n\ntable A { x: Missing; }": "small.fbs:3: A.x: unknown type 'Missing'",
+            "table A {\n  x: [uint];\n}":
+                "small.fbs:2: A.x: a list or text needs the attribute 'max'",
+            "table A { x: string; }": "small.fbs:1: A.x: a list or text needs the attribute 'max'",
+            "table A { x: uint (max: \"max_itms\"); }":
+                "small.fbs:1: A.x: max: expected a number or a field of Limits, got 'max_itms'",
+            "enum C: ubyte { Red = 0 }\ntable A { x: C (max: \"Blue\"); }":
+                "small.fbs:2: A.x: max: C has no enumerator 'Blue'",
+            "enum C: ubyte { Red = 1 }": "small.fbs:1: enum C: expected '0'",
+            "enum C: int { Red = 0 }": "small.fbs:1: enum C: expected the type ubyte, got 'int'",
+            "table A { x: uint }": "small.fbs:1: expected ';' after 'x: uint'",
+            "table A { x = 4; }": "small.fbs:1: A: cannot read the field 'x = 4'",
+            "union U { A, B }": "small.fbs:1: expected a table, struct or enum, got 'union U'",
+            "table A {\n  x: [string] (max: \"2\");\n}": "small.fbs:2: A.x: lists of strings",
+            "table A {\n  x: uint;": "small.fbs:2: the declaration does not end",
+        }
+        for text, expected in cases.items():
+            with self.subTest(text), self.assertRaises(SchemaError) as raised:
+                read(text)
+            self.assertTrue(str(raised.exception).startswith(expected), str(raised.exception))
+
+
+class CppTest(unittest.TestCase):
+    def setUp(self):
+        self.cpp = Cpp(read(SMALL))
+        self.source = self.cpp.codec_source()
+
+    def test_checks_every_field(self):
+        for line in (
+                'found.NonZero(m.seq, At(at, "seq"));',
+                'found.Known(m.color, 1, At(at, "color"), "expected a number from 0 to 1");',
+                'found.Text(m.text, {0, 16, "expected at most 16 bytes"}, At(at, "text"));',
+                'CheckList(found, m.items, {1, kMaxItems, "expected 1 to 65,536 entries"}, '
+                'At(at, "items"));',
+                'if (m.speed_m_s) found.AtLeast(*m.speed_m_s, 0, At(at, "speed_m_s"), '
+                '"expected a number of at least 0");'):
+            self.assertIn(line, self.source)
+
+    def test_decodes_and_encodes_renamed_and_inverted_members(self):
+        self.assertIn("m.visible = !w.hidden();", self.source)
+        self.assertIn("return wire::CreatePaint(b, m.seq, static_cast<wire::Color>(m.color), text, "
+                      "items, !m.visible, &place);", self.source)
+        self.assertNotIn("old", self.source)
+
+    def test_writes_limits_and_messages(self):
+        self.assertIn("/// Items per message.\ninline constexpr std::size_t kMaxItems = 65536;",
+                      self.cpp.limits_header())
+        self.assertIn("kPaint = 7,", self.cpp.message_type_header())
+        self.assertIn("X(Paint, Paint, true, false, true)", self.cpp.message_list())
+
+    def test_writes_json(self):
+        source = CppJson(read(SMALL)).source()
+        self.assertIn('json["seq"] = Decimal(m.seq);', source)
+        self.assertIn('json["hidden"] = !m.visible;', source)
+        self.assertIn('json["speed_m_s"] = m.speed_m_s ? Json(*m.speed_m_s) : Json(nullptr);',
+                      source)
+
+
+class TypeScriptTest(unittest.TestCase):
+    def test_writes_limits_and_layouts(self):
+        web = TypeScript(read(SMALL))
+        self.assertIn("/** Items per message. */\nexport const maxItems = 65536;", web.limits())
+        self.assertIn("[[0, 8, 8], [0, 4, 4], [0, 1, 1], [1, 1, 1], [4, 0, 4], [0, 1, 1], "
+                      "[0, 16, 8]],", web.layout())
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=1)
