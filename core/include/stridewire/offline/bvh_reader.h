@@ -14,13 +14,19 @@
 
 namespace stridewire {
 
+/// A direction along one of the file's own axes.
+enum class BvhAxis : std::uint8_t { kPlusX, kMinusX, kPlusY, kMinusY, kPlusZ, kMinusZ };
+
 /// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y
 /// up, facing +Z at identity rotations.
 struct Capture {
   std::string path;   ///< Path of the file, as passed by the caller.
   Skeleton skeleton;  ///< Skeleton whose legs have both been identified.
   Clip clip;
-  double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
+  double unit_m = 1.0;           ///< Length of one file unit in metres, detected or given.
+  BvhAxis up = BvhAxis::kPlusY;  ///< The up axis of the file, detected or given.
+  /// False: the figure stands neither in the rest pose nor in the motion, so that `up` is a guess.
+  bool up_is_certain = true;
   int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
   std::vector<std::string> notes;  ///< Assumptions and repairs of the reader, one sentence each.
 };
@@ -35,9 +41,6 @@ inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;
 inline constexpr double kMaxBvhNumber = 1e7;  ///< Largest magnitude of any number in the file.
 
 inline constexpr std::size_t kMaxBvhNameBytes = 256;  ///< Longest name of a joint, in bytes.
-
-/// A direction along one of the file's own axes.
-enum class BvhAxis : std::uint8_t { kPlusX, kMinusX, kPlusY, kMinusY, kPlusZ, kMinusZ };
 
 /// Overrides for properties that the reader otherwise detects by itself.
 struct BvhReadOptions {
@@ -58,21 +61,31 @@ struct BvhReadOptions {
 ///
 /// - The file may mix LF, CRLF and CR line ends. Blank lines, tabs, the letter case of keywords and
 ///   channels, the order of channels and a missing final line end do not matter. The name of a
-///   joint is the rest of its line. Duplicate names get a number appended.
-/// - Each line after `Frame Time` is one frame. A line with too few or too many numbers is an
-///   error. If the number of lines differs from `Frames`, the reader keeps the complete lines, at
-///   most `Frames` of them, and adds a note.
+///   joint is the rest of its line. Duplicate names get a number appended. Comments that begin with
+///   # or // are skipped. Scale channels are ignored.
+/// - A frame may continue on further lines, but must end at the end of a line. A frame with too few
+///   or too many numbers is an error, except that a truncated last frame is left out. If the number
+///   of frames differs from `Frames`, the reader keeps the complete frames, at most `Frames` of
+///   them unless that is 0, and adds a note.
+/// - Numbers may have decimal commas if no number has a decimal point.
+/// - The figure is the first ROOT that has legs. Its root is the lowest joint above both legs and
+///   the rest of the body, and contains the motion of all joints above it. Joints above it that
+///   carry no part of the body, such as cameras, are left out.
 /// - Position channels of the root replace its OFFSET. For other joints, the mean of the position
-///   channels becomes the offset, and a note states the largest deviation from it. If all positions
-///   of a joint are zero, its OFFSET is kept.
+///   channels becomes the offset, and a note states the largest deviation from it. If the mean
+///   moves a joint of the legs, the trunk or the arms by more than 2 cm, the file is rejected. If
+///   all positions of a joint are zero, its OFFSET is kept.
 /// - `Frame Time` is rounded to a whole number of frames per second if its digits allow it.
-/// - The reader detects legs by joint names. If that fails, it takes the longest pair of equally
-///   long chains that start nearest to the root. If there is no toe joint, the ball of the foot is
-///   a fixed point in the frame of the ankle. This point is the End Site of the foot if that is
-///   nearer than 0.2 leg lengths. Otherwise it is 2/3 of the way there, at the height of the
-///   End Site.
-/// - The up axis is the mean direction from ankles to hips over the motion. The rest pose is then
-///   turned to face +Z.
+/// - The reader detects legs by joint names, whose end contains the side and the part of the leg.
+///   If that fails, it takes the longest pair of equally long chains that start nearest to the root
+///   and whose ends are below the rest of the body. Joints inside the thigh or the shin that never
+///   bend the leg are no knees. A figure that lacks a leg or has more than two is rejected. If
+///   there is no toe joint, the ball of the foot is a fixed point in the frame of the ankle. This
+///   point is the End Site of the foot if that is nearer than 0.2 leg lengths. Otherwise it is 2/3
+///   of the way there, at the height of the End Site.
+/// - The up axis is that of a rest pose that stands. If the rest pose does not stand, or if the
+///   figure clearly stands and moves along another axis, it is the mean direction from ankles to
+///   hips over the motion. The rest pose is then turned to face +Z.
 /// - The unit is the common unit (m, ft, dm, 1/0.45 inch, inch, cm or mm) for which the legs are
 ///   0.68 to 1.0 m long. If no unit fits, the motion is scaled so that standing hips are at 0.95 m.
 /// - `Capture::first_frame` skips an artificial rest pose at the start. The reader assumes such a
@@ -80,7 +93,7 @@ struct BvhReadOptions {
 ///   as far as in the following frames, or at more than 600 degrees/s from a frame whose root is
 ///   not rotated. It skips frames while at least two joints turn that fast, at most 0.1 s.
 /// - If `Frame Time` implies feet that are too slow for a person, the reader adds a note; use `fps`
-///   to override it.
+///   to override it. A file without `Frame Time` needs `fps`.
 ///
 /// Errors: kNotFound or kIo if the file cannot be read. kMalformed, kOutOfRange, kLimitExceeded or
 /// kUnsupported for its contents, with "file:line" in `where`, or the file name alone if the error

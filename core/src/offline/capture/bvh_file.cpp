@@ -26,13 +26,18 @@ bool StartsWithWord(std::string_view a, std::string_view lower_word) {
   return a.size() >= lower_word.size() && EqualsWord(a.substr(0, lower_word.size()), lower_word);
 }
 
-enum class NumberFault { kNone, kNotANumber, kTooLarge };
+enum class NumberFault { kNone, kNotANumber, kTooLarge, kMixedPoint };
 
 static_assert(kMaxBvhNumber == 1e7 && kMaxBvhNameBytes == 256);
 constexpr const char* kTooLargeText = "expected a finite number from -1e7 to 1e7";
+constexpr const char* kMixedPointText =
+    "expected a number with the same decimal mark as the others; the file mixes commas and points";
+constexpr const char* kFewerNumbersText = "the frame has fewer numbers than channels";
+constexpr int kMaxChannels = 9;
+constexpr std::size_t kMaxNumberBytes = 64;  // Longest number with a decimal comma.
 
 // Parses a finite number within kMaxBvhNumber. Values too small for a double become zero.
-NumberFault ReadNumber(std::string_view token, double& value) {
+NumberFault ParseNumber(std::string_view token, double& value) {
   std::string_view digits = token;
   if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
   const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
@@ -44,6 +49,18 @@ NumberFault ReadNumber(std::string_view token, double& value) {
     return NumberFault::kNotANumber;
   }
   return std::fabs(value) <= kMaxBvhNumber ? NumberFault::kNone : NumberFault::kTooLarge;
+}
+
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
+
+// Returns true if the text contains a number with a decimal point.
+bool HasDecimalPoint(std::string_view text) {
+  for (std::size_t at = text.find('.'); at != std::string_view::npos; at = text.find('.', at + 1)) {
+    const char before = at == 0 ? ' ' : text[at - 1];
+    const bool starts = IsDigit(before) || before == '-' || before == '+' || IsSpace(before);
+    if (starts && at + 1 < text.size() && IsDigit(text[at + 1])) return true;
+  }
+  return false;
 }
 
 // Joint names are written to reports and other files, which are UTF-8.
@@ -81,10 +98,21 @@ class Parser {
   }
 
   Expected<BvhFile> Run() {
+    if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF")) {
+      return FailAt(1, ErrorCode::kMalformed, "the file is UTF-16 text; save it as UTF-8");
+    }
     for (const auto step :
          {&Parser::ParseHierarchy, &Parser::ParseMotionHead, &Parser::ParseRows}) {
       if (Status status = (this->*step)(); !status)
         return std::unexpected(std::move(status.error()));
+    }
+    if (replaced_names_ > 0) {
+      NoteAt(replaced_name_line_, "the name is not UTF-8; _ replaces its special characters" +
+                                      AndMore(replaced_names_ - 1, "name"));
+    }
+    if (wrapped_rows_ > 0) {
+      NoteAt(wrapped_row_line_,
+             "the frame continues on the next line" + AndMore(wrapped_rows_ - 1, "frame"));
     }
     return std::move(file_);
   }
@@ -98,6 +126,15 @@ class Parser {
     return FailAt(token_line_, ErrorCode::kMalformed, sentence);
   }
 
+  void NoteAt(int line, const std::string& text) {
+    file_.notes.push_back("line " + std::to_string(line) + ": " + text);
+  }
+  // Returns ", as in 3 more frames", or an empty string if the count is zero.
+  static std::string AndMore(int count, const char* noun) {
+    if (count == 0) return "";
+    return ", as in " + std::to_string(count) + " more " + noun + (count == 1 ? "" : "s");
+  }
+
   // Skips one line end (LF, CRLF or CR) at `at_`.
   void SkipLineEnd() {
     if (text_[at_] == '\r' && at_ + 1 < text_.size() && text_[at_ + 1] == '\n') ++at_;
@@ -106,15 +143,19 @@ class Parser {
   }
   static bool IsLineEnd(char c) { return c == '\n' || c == '\r'; }
 
+  // Skips spaces, and a comment that ends the line.
+  void SkipSpaceInLine() {
+    while (at_ < text_.size() && IsSpace(text_[at_])) ++at_;
+    if (at_ >= text_.size() || (text_[at_] != '#' && !text_.substr(at_).starts_with("//"))) return;
+    while (at_ < text_.size() && !IsLineEnd(text_[at_])) ++at_;
+  }
+
+  // Skips spaces, line ends and comments.
   void SkipSpace() {
-    while (at_ < text_.size()) {
-      if (IsLineEnd(text_[at_])) {
-        SkipLineEnd();
-      } else if (IsSpace(text_[at_])) {
-        ++at_;
-      } else {
-        return;
-      }
+    SkipSpaceInLine();
+    while (at_ < text_.size() && IsLineEnd(text_[at_])) {
+      SkipLineEnd();
+      SkipSpaceInLine();
     }
   }
 
@@ -145,13 +186,57 @@ class Parser {
     return rest;
   }
 
-  Status NextNumber(double& value, const char* sentence) {
-    switch (ReadNumber(Next(), value)) {
+  // Returns the next word without consuming it.
+  std::string_view Peek() {
+    const std::size_t at = at_;
+    const int line = line_;
+    const int token_line = token_line_;
+    const std::string_view word = Next();
+    at_ = at;
+    line_ = line;
+    token_line_ = token_line;
+    return word;
+  }
+
+  // Parses a number with a decimal point, or with a decimal comma if no number has a point.
+  NumberFault ReadNumber(std::string_view token, double& value) {
+    if (!has_decimal_comma_) {
+      const NumberFault fault = ParseNumber(token, value);
+      if (fault != NumberFault::kNotANumber) return fault;
+    }
+    const std::size_t comma = token.find(',');
+    const bool has_point = token.find('.') != std::string_view::npos;
+    if (comma == std::string_view::npos) {
+      const NumberFault fault = ParseNumber(token, value);
+      return has_point && fault == NumberFault::kNone ? NumberFault::kMixedPoint : fault;
+    }
+    if (token.size() > kMaxNumberBytes) return NumberFault::kNotANumber;
+    std::string with_point(token);
+    with_point[comma] = '.';
+    const NumberFault fault = ParseNumber(with_point, value);
+    if (fault != NumberFault::kNone) return fault;
+    if (!has_decimal_comma_) {
+      if (HasDecimalPoint(text_.substr(0, at_))) return NumberFault::kMixedPoint;
+      has_decimal_comma_ = true;
+      NoteAt(line_, "commas in numbers are read as decimal points");
+    }
+    return NumberFault::kNone;
+  }
+
+  Status NumberError(int line, NumberFault fault, const char* sentence, std::int64_t index = -1) {
+    switch (fault) {
       case NumberFault::kNone: return {};
-      case NumberFault::kNotANumber: return Malformed(sentence);
+      case NumberFault::kNotANumber: return FailAt(line, ErrorCode::kMalformed, sentence, index);
+      case NumberFault::kMixedPoint:
+        return FailAt(line, ErrorCode::kMalformed, kMixedPointText, index);
       case NumberFault::kTooLarge: break;
     }
-    return FailAt(token_line_, ErrorCode::kOutOfRange, kTooLargeText);
+    return FailAt(line, ErrorCode::kOutOfRange, kTooLargeText, index);
+  }
+
+  Status NextNumber(double& value, const char* sentence) {
+    const NumberFault fault = ReadNumber(Next(), value);
+    return NumberError(token_line_, fault, sentence);
   }
 
   Status ParseOffset(DVec3& offset) {
@@ -170,8 +255,8 @@ class Parser {
         !status) {
       return status;
     }
-    if (!(count >= 0.0 && count <= 6.0) || count != std::floor(count)) {
-      return FailAt(token_line_, ErrorCode::kOutOfRange, "expected 0 to 6 channels");
+    if (!(count >= 0.0 && count <= kMaxChannels) || count != std::floor(count)) {
+      return FailAt(token_line_, ErrorCode::kOutOfRange, "expected 0 to 9 channels");
     }
     STRIDEWIRE_CHECK(joint.channels.empty());
     joint.first_channel = file_.channel_count;
@@ -181,12 +266,15 @@ class Parser {
       if (word.empty() || (channel.axis = Lower(word[0]) - 'x') < 0 || channel.axis > 2) {
         return Malformed("expected a channel name such as Xposition or Zrotation");
       }
-      channel.is_rotation = EqualsWord(word.substr(1), "rotation");
-      if (!channel.is_rotation && !EqualsWord(word.substr(1), "position")) {
+      if (EqualsWord(word.substr(1), "rotation")) {
+        channel.kind = BvhChannelKind::kRotation;
+      } else if (EqualsWord(word.substr(1), "scale")) {
+        channel.kind = BvhChannelKind::kScale;
+      } else if (!EqualsWord(word.substr(1), "position")) {
         return Malformed("expected a channel name such as Xposition or Zrotation");
       }
       for (const BvhChannel& other : joint.channels) {
-        if (other.axis == channel.axis && other.is_rotation == channel.is_rotation) {
+        if (other.axis == channel.axis && other.kind == channel.kind) {
           return Malformed("duplicate channel");
         }
       }
@@ -212,6 +300,7 @@ class Parser {
       for (char& c : name) {
         if (static_cast<unsigned char>(c) >= 0x80) c = '_';
       }
+      if (replaced_names_++ == 0) replaced_name_line_ = line;
     }
     if (static_cast<int>(file_.joints.size()) >= kMaxJoints) {
       return FailAt(line, ErrorCode::kLimitExceeded, "the skeleton has more joints than the limit",
@@ -258,12 +347,26 @@ class Parser {
     return {};
   }
 
-  // Uses its own stack instead of recursion, so that no file can overflow the call stack.
   Status ParseHierarchy() {
     if (!EqualsWord(Next(), "hierarchy")) {
       return Malformed("expected HIERARCHY at the beginning; this is not a BVH file");
     }
     if (!EqualsWord(Next(), "root")) return Malformed("expected ROOT after HIERARCHY");
+    if (Status status = ParseRoot(); !status) return status;
+    while (EqualsWord(Peek(), "root")) {
+      Next();
+      if (Status status = ParseRoot(); !status) return status;
+    }
+    if (file_.channel_count == 0) {
+      Next();
+      return Malformed("expected CHANNELS for at least one joint");
+    }
+    return {};
+  }
+
+  // Parses a root and all joints below it. Uses its own stack instead of recursion, so that no file
+  // can overflow the call stack.
+  Status ParseRoot() {
     if (Status status = OpenJoint(-1); !status) return status;
     while (!stack_.empty()) {
       Open& open = stack_.back();
@@ -293,7 +396,6 @@ class Parser {
       }
       if (!status) return status;
     }
-    if (file_.channel_count == 0) return Malformed("expected CHANNELS for at least one joint");
     return {};
   }
 
@@ -314,25 +416,40 @@ class Parser {
     return true;
   }
 
-  Status ParseMotionHead() {
-    const std::string_view word = Next();
-    if (EqualsWord(word, "root")) {
-      return FailAt(token_line_, ErrorCode::kUnsupported,
-                    "the file has a second ROOT; only one figure per file is supported");
-    }
-    if (!EqualsWord(word, "motion")) return Malformed("expected MOTION after HIERARCHY");
-    if (!SkipLabel("frames", "")) return Malformed("expected Frames: after MOTION");
+  Status ParseFrameCount() {
     const std::string_view count = Next();
-    const auto [end, code] =
-        std::from_chars(count.data(), count.data() + count.size(), declared_frames_);
-    if (code == std::errc::result_out_of_range && end == count.data() + count.size() &&
-        count.front() != '-') {
-      // A value that does not fit counts as INT64_MAX; no file can have that many rows.
-      declared_frames_ = INT64_MAX;
-    } else if (code != std::errc() || end != count.data() + count.size() || declared_frames_ < 1) {
-      return Malformed("Frames: expected an integer of at least 1");
-    }
     frames_line_ = token_line_;
+    double value = 0.0;
+    const char* const expected = "Frames: expected an integer of at least 0";
+    // A count above kMaxBvhNumber is valid, since the file may contain fewer frames.
+    const NumberFault fault = ParseNumber(count, value);
+    if ((fault != NumberFault::kNone && fault != NumberFault::kTooLarge) || !(value >= 0.0) ||
+        value != std::floor(value)) {
+      return Malformed(expected);
+    }
+    if (value >= 9e18) {
+      declared_frames_ = INT64_MAX;  // No file can have that many rows.
+    } else {
+      declared_frames_ = static_cast<std::int64_t>(value);
+    }
+    if (!std::ranges::all_of(count, IsDigit)) {
+      NoteAt(frames_line_, "the number of frames is written as " +
+                               std::string(count.substr(0, kMaxNumberBytes)) +
+                               ", not as an integer");
+    }
+    return {};
+  }
+
+  Status ParseMotionHead() {
+    if (!EqualsWord(Next(), "motion")) return Malformed("expected MOTION after HIERARCHY");
+    if (!SkipLabel("frames", "")) return Malformed("expected Frames: after MOTION");
+    if (Status status = ParseFrameCount(); !status) return status;
+    if (double number = 0.0; ParseNumber(Peek(), number) == NumberFault::kNone) {
+      SkipSpace();
+      file_.has_frame_time = false;
+      file_.frame_time_line = line_;
+      return {};
+    }
     if (!SkipLabel("frame", "time")) return Malformed("expected Frame Time: after Frames:");
     SkipSpace();
     const std::size_t begin = at_;
@@ -341,7 +458,10 @@ class Parser {
       return status;
     }
     file_.frame_time_line = token_line_;
-    file_.frame_time_digit_s = LastDigit(text_.substr(begin, at_ - begin));
+    std::string written(text_.substr(begin, at_ - begin));
+    std::ranges::replace(written, ',', '.');
+    file_.frame_time_digit_s = LastDigit(written);
+    SkipSpaceInLine();
     if (!RestOfLine().empty()) return Malformed("Frame Time: unexpected text after the number");
     return {};
   }
@@ -358,53 +478,73 @@ class Parser {
     for (;;) {
       SkipSpace();
       if (at_ >= text_.size()) break;
-      if (frames == declared_frames_) {
-        file_.notes.push_back("line " + std::to_string(line_) +
-                              ": ignored the frames beyond the number declared by Frames:");
+      if (frames == declared_frames_ && declared_frames_ > 0) {
+        NoteAt(line_, "ignored the frames beyond the number declared by Frames:");
         break;
       }
       if ((frames + 1) * joints > kMaxBvhRotations) {
         return FailAt(line_, ErrorCode::kLimitExceeded, "the motion has more frames than the limit",
                       frames);
       }
-      if (Status status = ParseRow(channels); !status) return status;
+      const int line = line_;
+      Expected<bool> complete = ParseRow(channels);
+      if (!complete) return std::unexpected(std::move(complete.error()));
+      if (!*complete) {
+        const std::size_t kept = static_cast<std::size_t>(frames) * channels;
+        if (frames == 0) {
+          return FailAt(line, ErrorCode::kMalformed, kFewerNumbersText,
+                        static_cast<std::int64_t>(file_.values.size() - kept));
+        }
+        file_.values.resize(kept);
+        NoteAt(line, "the last frame is incomplete and is left out");
+        break;
+      }
       ++frames;
     }
-    if (frames == 0) return FailAt(line_, ErrorCode::kMalformed, "expected at least one frame");
-    if (frames < declared_frames_) {
-      file_.notes.push_back("line " + std::to_string(frames_line_) + ": Frames: declares " +
-                            std::to_string(declared_frames_) + " frames, but the file contains " +
-                            std::to_string(frames));
+    if (frames == 0) {
+      return FailAt(line_, ErrorCode::kMalformed, "expected at least one frame after Frame Time:");
+    }
+    if (frames < declared_frames_ || declared_frames_ == 0) {
+      NoteAt(frames_line_, "Frames: declares " + std::to_string(declared_frames_) +
+                               " frames, but the file contains " + std::to_string(frames));
     }
     STRIDEWIRE_CHECK(file_.values.size() == static_cast<std::size_t>(frames) * channels);
     file_.frame_count = static_cast<int>(frames);
     return {};
   }
 
-  Status ParseRow(std::size_t channels) {
+  // Parses a frame, which may continue on further lines but must end at the end of a line. Returns
+  // false if the file ends before the frame is complete.
+  Expected<bool> ParseRow(std::size_t channels) {
+    const int first_line = line_;
+    std::size_t in_first_line = 0;
     for (std::size_t i = 0;; ++i) {
-      while (at_ < text_.size() && IsSpace(text_[at_])) ++at_;
-      const std::size_t begin = at_;
-      while (at_ < text_.size() && !IsSpace(text_[at_]) && !IsLineEnd(text_[at_])) ++at_;
-      if (at_ == begin) {
-        if (i == channels) return {};
-        return FailAt(line_, ErrorCode::kMalformed, "the frame has fewer numbers than channels",
-                      static_cast<std::int64_t>(i));
+      SkipSpaceInLine();
+      if (at_ >= text_.size() || IsLineEnd(text_[at_])) {
+        if (line_ == first_line) in_first_line = i;
+        if (i == channels) break;
+        SkipSpace();
+        if (at_ >= text_.size()) return false;
       }
       if (i == channels) {
-        return FailAt(line_, ErrorCode::kMalformed, "the frame has more numbers than channels");
+        if (line_ == first_line) {
+          return FailAt(line_, ErrorCode::kMalformed, "the frame has more numbers than channels");
+        }
+        return FailAt(first_line, ErrorCode::kMalformed, kFewerNumbersText,
+                      static_cast<std::int64_t>(in_first_line));
       }
+      const std::size_t begin = at_;
+      while (at_ < text_.size() && !IsSpace(text_[at_]) && !IsLineEnd(text_[at_])) ++at_;
       double value = 0.0;
-      switch (ReadNumber(text_.substr(begin, at_ - begin), value)) {
-        case NumberFault::kNone: break;
-        case NumberFault::kNotANumber:
-          return FailAt(line_, ErrorCode::kMalformed, "expected a number",
-                        static_cast<std::int64_t>(i));
-        case NumberFault::kTooLarge:
-          return FailAt(line_, ErrorCode::kOutOfRange, kTooLargeText, static_cast<std::int64_t>(i));
+      const NumberFault fault = ReadNumber(text_.substr(begin, at_ - begin), value);
+      if (fault != NumberFault::kNone) {
+        return std::unexpected(
+            NumberError(line_, fault, "expected a number", static_cast<std::int64_t>(i)).error());
       }
       file_.values.push_back(static_cast<float>(value));
     }
+    if (line_ != first_line && wrapped_rows_++ == 0) wrapped_row_line_ = first_line;
+    return true;
   }
 
   struct Open {
@@ -420,6 +560,11 @@ class Parser {
   int token_line_ = 1;
   std::int64_t declared_frames_ = 0;
   int frames_line_ = 0;
+  bool has_decimal_comma_ = false;
+  int replaced_names_ = 0;
+  int replaced_name_line_ = 0;
+  int wrapped_rows_ = 0;
+  int wrapped_row_line_ = 0;
   std::vector<Open> stack_;
   std::unordered_set<std::string> names_;
   BvhFile file_;

@@ -9,15 +9,17 @@
 
 namespace stridewire {
 
+enum class BvhChannelKind { kPosition, kRotation, kScale };
+
 /// The meaning of one number per frame. BvhJoint::first_channel assigns channels to joints.
 struct BvhChannel {
-  bool is_rotation = false;
+  BvhChannelKind kind = BvhChannelKind::kPosition;
   int axis = 0;  ///< 0: x, 1: y, 2: z.
 };
 
 struct BvhJoint {
   std::string name;
-  int parent = -1;
+  int parent = -1;            ///< -1: a root.
   int line = 0;               ///< Line number of the joint's OFFSET.
   DVec3 offset = DVec3(0.0);  ///< The joint's OFFSET, in file units.
   std::vector<BvhChannel> channels;
@@ -32,11 +34,13 @@ struct BvhEndSite {
 
 /// The contents of a BVH file, in its own units and axes.
 struct BvhFile {
+  /// Parents precede their children, and the joints of each root are contiguous.
   std::vector<BvhJoint> joints;
   std::vector<BvhEndSite> end_sites;
   int channel_count = 0;
   int frame_count = 0;
-  double frame_time_s = 0.0;  ///< Frame time as written in the file; any finite number.
+  bool has_frame_time = true;  ///< False: the file has no `Frame Time`.
+  double frame_time_s = 0.0;   ///< Frame time as written in the file; any finite number.
   /// Value of one unit in the last written digit of the frame time.
   double frame_time_digit_s = 0.0;
   int frame_time_line = 0;
@@ -46,7 +50,7 @@ struct BvhFile {
 };
 
 /// Parses a BVH file and checks its syntax, but not whether it describes a person. `name` is the
-/// beginning of every `where`.
+/// beginning of every `where`. See ReadBvh for the deviations from the format that are accepted.
 [[nodiscard]] Expected<BvhFile> ParseBvhFile(std::string_view text, std::string_view name);
 
 }  // namespace stridewire

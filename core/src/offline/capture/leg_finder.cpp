@@ -1,190 +1,67 @@
 #include "offline/capture/leg_finder.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
 
 #include "base/check.h"
+#include "offline/capture/file_axis.h"
+#include "offline/capture/leg_chain.h"
+#include "offline/capture/leg_names.h"
 
 namespace stridewire {
 namespace {
 
-bool IsUpper(char c) { return c >= 'A' && c <= 'Z'; }
-bool IsLower(char c) { return c >= 'a' && c <= 'z'; }
+// Lengths of limbs of a pair differ by at most this share.
+constexpr double kPairTolerance = 0.08;
+// The ends of legs may be this share of their length above the lowest point of the figure.
+constexpr double kFloorShare = 0.15;
+// Legs point down if the sum of both leg vectors is at least this share of their lengths.
+constexpr double kPointsDownShare = 0.3;
+// Another limb this long, as a share of the legs, can be a further leg.
+constexpr double kOtherLegShare = 0.5;
+constexpr double kStandsShare = 0.8;
+// A trunk that rises less than this share of its length is horizontal.
+constexpr double kHorizontalShare = 0.5;
+constexpr double kMostPoses = 0.9;
 
-const Joint& At(const std::vector<Joint>& joints, int j) {
-  return joints[static_cast<std::size_t>(j)];
+using Pose = std::vector<DVec3>;
+
+// The poses from which directions are determined: those of the motion, or else the rest pose.
+std::span<const Pose> PosesOf(const FigureShape& figure) {
+  return figure.poses.empty() ? std::span(&figure.rest, 1) : std::span(figure.poses);
 }
 
-// Splits a name into lower-case words: "mixamorig:LeftUpLeg" -> left, up, leg; "LHipJoint" -> l,
-// hip, joint.
-std::vector<std::string> Words(std::string_view name) {
-  name.remove_prefix(name.find_last_of(":|") + 1);  // npos + 1 is 0
-  std::vector<std::string> words;
-  bool open = false;
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    const char c = name[i];
-    if (!IsUpper(c) && !IsLower(c)) {
-      open = false;
-      continue;
-    }
-    const bool next_is_lower = i + 1 < name.size() && IsLower(name[i + 1]);
-    const bool starts = IsUpper(c) && (i == 0 || IsLower(name[i - 1]) || next_is_lower);
-    if (!open || starts) words.emplace_back();
-    open = true;
-    words.back() += IsUpper(c) ? static_cast<char>(c - 'A' + 'a') : c;
-  }
-  return words;
-}
-
-LegPart PartOf(const std::string& word) {
-  const auto has = [&](std::initializer_list<std::string_view> parts) {
-    return std::any_of(parts.begin(), parts.end(),
-                       [&](std::string_view part) { return word.find(part) != std::string::npos; });
-  };
-  // Ignores helper joints of rigs and tips.
-  if (has({"ik", "pole", "target", "ctrl", "roll", "twist", "heel"})) return LegPart::kNone;
-  if (has({"toe", "ball"})) return has({"end", "tip", "nub"}) ? LegPart::kNone : LegPart::kBall;
-  if (has({"end", "tip", "nub", "index", "hand", "arm"})) return LegPart::kNone;
-  if (has({"upleg", "upperleg", "legupper", "thigh", "femur"}) || word == "hip" || word == "uleg") {
-    return LegPart::kHip;
-  }
-  if (has({"knee", "shin", "calf", "tibia", "lowleg", "lowerleg", "leglower"}) || word == "leg" ||
-      word == "lleg") {
-    return LegPart::kKnee;
-  }
-  if (has({"ankle"}) || word == "foot") return LegPart::kAnkle;
-  return LegPart::kNone;
-}
-
-float Length(const std::vector<Joint>& joints, int j) {
-  return glm::length(At(joints, j).offset_m);
+bool IsBelow(const std::vector<Joint>& joints, int j, int ancestor) {
+  while (j > ancestor) j = joints[Index(j)].parent;
+  return j == ancestor;
 }
 
 int Depth(const std::vector<Joint>& joints, int j) {
   int depth = 0;
-  for (; At(joints, j).parent >= 0; j = At(joints, j).parent) ++depth;
+  for (; joints[Index(j)].parent >= 0; j = joints[Index(j)].parent) ++depth;
   return depth;
 }
 
-bool IsBelow(const std::vector<Joint>& joints, int j, int ancestor) {
-  while (j > ancestor) j = At(joints, j).parent;
-  return j == ancestor;
-}
+// Two chains that start at children of the same joint.
+struct LimbPair {
+  std::vector<int> chains[2];  // From the first joint to the last one.
+  double length = 0.0;
+  int depth = 0;
+};
 
-// Finds the toe joint below an ankle: the nearest joint with a matching name, or else the only
-// child if its bone has a length. Joints are sorted parents first, so the first match is a nearest
-// one.
-int FindBall(const std::vector<Joint>& joints, int ankle) {
-  int only = -1;
-  int children = 0;
-  for (int j = ankle + 1; j < static_cast<int>(joints.size()); ++j) {
-    if (!IsBelow(joints, j, ankle)) continue;
-    if (ReadLegName(At(joints, j).name).part == LegPart::kBall) return j;
-    if (At(joints, j).parent == ankle) {
-      ++children;
-      only = j;
-    }
-  }
-  if (children != 1 || !(Length(joints, only) > 0.0f)) return -1;
-  const std::vector<std::string> words = Words(At(joints, only).name);
-  const bool is_tip = std::any_of(words.begin(), words.end(), [](const std::string& word) {
-    return word == "end" || word == "tip" || word == "nub";
-  });
-  return is_tip ? -1 : only;
-}
-
-}  // namespace
-
-LegName ReadLegName(std::string_view name) {
-  std::vector<std::string> words = Words(name);
-  LegName result;
-  const auto side_of = [](const std::string& word) {
-    if (word == "left" || word == "l" || word == "lft") return Side::kLeft;
-    if (word == "right" || word == "r" || word == "rgt" || word == "rt") return Side::kRight;
-    return Side::kNone;
-  };
-  std::string rest;
-  for (std::string& word : words) {
-    if (const Side side = side_of(word); side != Side::kNone && result.side == Side::kNone) {
-      result.side = side;
-    } else if (word != "joint" && word != "jnt" && word != "bone" && word != "bip" &&
-               word != "def") {
-      rest += word;
-    }
-  }
-  result.part = PartOf(rest);
-  // Names such as "lfemur" or "leftfoot" begin with the side without a separator.
-  if (result.side == Side::kNone) {
-    for (const std::string_view prefix : {"left", "right", "l", "r"}) {
-      if (!rest.starts_with(prefix)) continue;
-      const LegPart part = PartOf(rest.substr(prefix.size()));
-      if (part == LegPart::kNone) continue;
-      result.side = prefix[0] == 'l' ? Side::kLeft : Side::kRight;
-      result.part = part;
-      break;
-    }
-  }
-  if (result.side == Side::kNone) result.part = LegPart::kNone;
-  return result;
-}
-
-bool FindLegAbove(const std::vector<Joint>& joints, int ankle, FoundLeg& leg) {
-  leg = FoundLeg{};
-  leg.ankle = ankle;
-  const auto nearest_above = [&](int from, LegPart part) {
-    for (int j = At(joints, from).parent; j > 0; j = At(joints, j).parent) {
-      if (ReadLegName(At(joints, j).name).part == part) return j;
-    }
-    // Without a matching name, takes the next joint up that has a bone of non-zero length below it.
-    int child = from;
-    for (int j = At(joints, from).parent; j >= 0; child = j, j = At(joints, j).parent) {
-      if (Length(joints, child) > 0.0f) return j;
-    }
-    return -1;
-  };
-  leg.knee = nearest_above(ankle, LegPart::kKnee);
-  if (leg.knee <= 0) return false;
-  leg.hip = nearest_above(leg.knee, LegPart::kHip);
-  if (leg.hip <= 0) return false;
-  STRIDEWIRE_CHECK(leg.hip < leg.knee && leg.knee < ankle);
-  leg.ball = FindBall(joints, ankle);
-  return true;
-}
-
-bool FindLegsByName(const std::vector<Joint>& joints, FoundLegs& legs) {
-  for (int side = 0; side < 2; ++side) {
-    int best = -1;
-    int best_depth = 0;
-    FoundLeg found;
-    for (int j = 0; j < static_cast<int>(joints.size()); ++j) {
-      const LegName name = ReadLegName(At(joints, j).name);
-      if (name.part != LegPart::kAnkle || name.side != (side == 0 ? Side::kLeft : Side::kRight)) {
-        continue;
-      }
-      const int depth = Depth(joints, j);
-      FoundLeg leg;
-      if ((best < 0 || depth < best_depth) && FindLegAbove(joints, j, leg)) {
-        best = j;
-        best_depth = depth;
-        found = leg;
-      }
-    }
-    if (best < 0) return false;
-    legs.legs[side] = found;
-  }
-  legs.sides_known = true;
-  return legs.legs[0].hip != legs.legs[1].hip;
-}
-
-bool FindLegsByShape(const std::vector<Joint>& joints, FoundLegs& legs) {
+std::vector<LimbPair> FindLimbPairs(const FigureShape& figure) {
+  const std::vector<Joint>& joints = figure.joints;
   const int count = static_cast<int>(joints.size());
   // Longest chain of bones below each joint, without its own offset.
-  std::vector<float> reach(joints.size(), 0.0f);
+  std::vector<double> reach(joints.size(), 0.0);
   std::vector<int> next(joints.size(), -1);
   for (int j = count - 1; j > 0; --j) {
-    const auto parent = static_cast<std::size_t>(At(joints, j).parent);
-    const float length = reach[static_cast<std::size_t>(j)] + Length(joints, j);
+    if (joints[Index(j)].parent < 0) continue;
+    const std::size_t parent = Index(joints[Index(j)].parent);
+    const double length = reach[Index(j)] + glm::length(DVec3(joints[Index(j)].offset_m));
     if (next[parent] < 0 || length >= reach[parent]) {
       reach[parent] = length;
       next[parent] = j;
@@ -192,50 +69,334 @@ bool FindLegsByShape(const std::vector<Joint>& joints, FoundLegs& legs) {
   }
   const auto chain_below = [&](int j) {
     std::vector<int> chain;
-    for (; j >= 0; j = next[static_cast<std::size_t>(j)]) chain.push_back(j);
+    for (; j >= 0; j = next[Index(j)]) chain.push_back(j);
     return chain;
   };
-  int best[2] = {-1, -1};
-  int best_depth = 0;
-  float best_length = 0.0f;
+  std::vector<LimbPair> pairs;
   for (int a = 1; a < count; ++a) {
-    const float length_a = reach[static_cast<std::size_t>(a)];
+    if (!(reach[Index(a)] > 0.0) || joints[Index(a)].parent < 0) continue;
     for (int b = a + 1; b < count; ++b) {
-      if (At(joints, a).parent != At(joints, b).parent) continue;
-      const float length_b = reach[static_cast<std::size_t>(b)];
-      if (!(length_a > 0.0f) || std::fabs(length_a - length_b) > 0.08f * length_a) continue;
-      const std::size_t joints_a = chain_below(a).size();
-      if (joints_a < 3 || joints_a != chain_below(b).size()) continue;
-      const int depth = Depth(joints, a);
-      if (best[0] < 0 || depth < best_depth || (depth == best_depth && length_a > best_length)) {
-        best[0] = a;
-        best[1] = b;
-        best_depth = depth;
-        best_length = length_a;
+      if (joints[Index(a)].parent != joints[Index(b)].parent) continue;
+      if (std::fabs(reach[Index(a)] - reach[Index(b)]) > kPairTolerance * reach[Index(a)]) continue;
+      LimbPair pair;
+      pair.chains[0] = chain_below(a);
+      pair.chains[1] = chain_below(b);
+      if (pair.chains[0].size() < 3 || pair.chains[0].size() != pair.chains[1].size()) continue;
+      pair.length = reach[Index(a)];
+      pair.depth = Depth(joints, a);
+      pairs.push_back(std::move(pair));
+    }
+  }
+  return pairs;
+}
+
+bool HasNameOutsideLegs(const FigureShape& figure, const LimbPair& pair) {
+  for (const std::vector<int>& chain : pair.chains) {
+    for (const int j : chain) {
+      if (IsNameOutsideLegs(figure.joints[Index(j)].name)) return true;
+    }
+  }
+  return false;
+}
+
+// Returns the lowest height of a chain in direction `up`.
+double LowestOf(const Pose& pose, const std::vector<int>& chain, const DVec3& up) {
+  double lowest = INFINITY;
+  for (const int j : chain) lowest = std::min(lowest, glm::dot(pose[Index(j)], up));
+  return lowest;
+}
+
+// Returns the direction in which the legs carry the body, one of the six axes. Empty if they do
+// not: they point nowhere, or other joints are lower than their ends in most poses.
+std::optional<DVec3> CarryingDirection(const FigureShape& figure, const LimbPair& pair) {
+  const std::span<const Pose> poses = PosesOf(figure);
+  DVec3 sum(0.0);
+  for (const Pose& pose : poses) {
+    for (const std::vector<int>& chain : pair.chains) {
+      sum += pose[Index(chain.front())] - pose[Index(chain.back())];
+    }
+  }
+  const DVec3 up = AxisVector(NearestAxis(sum));
+  const double most = 2.0 * pair.length * static_cast<double>(poses.size());
+  if (!(glm::dot(sum, up) >= kPointsDownShare * most)) return std::nullopt;
+  std::size_t carried = 0;
+  for (const Pose& pose : poses) {
+    double others = INFINITY;
+    for (std::size_t j = 0; j < pose.size(); ++j) {
+      const int joint = static_cast<int>(j);
+      if (IsBelow(figure.joints, joint, pair.chains[0].front()) ||
+          IsBelow(figure.joints, joint, pair.chains[1].front())) {
+        continue;
+      }
+      others = std::min(others, glm::dot(pose[j], up));
+    }
+    const double ends =
+        std::min(LowestOf(pose, pair.chains[0], up), LowestOf(pose, pair.chains[1], up));
+    carried += ends <= others + kFloorShare * pair.length;
+  }
+  if (2 * carried < poses.size()) return std::nullopt;
+  return up;
+}
+
+// Returns true if the ends of `other` are as low as those of `legs`: in the rest pose if that
+// stands, else in most poses of the motion.
+bool ReachesTheGround(const FigureShape& figure, const LimbPair& legs, const LimbPair& other,
+                      const DVec3& up) {
+  const auto reaches = [&](const Pose& pose) {
+    const double floor =
+        std::max(LowestOf(pose, legs.chains[0], up), LowestOf(pose, legs.chains[1], up));
+    const double ends =
+        std::max(LowestOf(pose, other.chains[0], up), LowestOf(pose, other.chains[1], up));
+    return ends <= floor + kFloorShare * legs.length;
+  };
+  DVec3 rest_legs(0.0);
+  for (const std::vector<int>& chain : legs.chains) {
+    rest_legs += figure.rest[Index(chain.front())] - figure.rest[Index(chain.back())];
+  }
+  if (glm::dot(rest_legs, up) >= kStandsShare * 2.0 * legs.length || figure.poses.empty()) {
+    return reaches(figure.rest);
+  }
+  const auto count = std::ranges::count_if(figure.poses, reaches);
+  return static_cast<double>(count) >= kMostPoses * static_cast<double>(figure.poses.size());
+}
+
+bool IsDisjoint(const FigureShape& figure, const LimbPair& a, const LimbPair& b) {
+  for (const std::vector<int>& chain : a.chains) {
+    for (const std::vector<int>& other : b.chains) {
+      if (IsBelow(figure.joints, chain.front(), other.front()) ||
+          IsBelow(figure.joints, other.front(), chain.front())) {
+        return false;
       }
     }
   }
-  if (best[0] < 0) return false;
-  for (int side = 0; side < 2; ++side) {
-    const std::vector<int> chain = chain_below(best[side]);
-    STRIDEWIRE_CHECK(chain.size() >= 3);
-    std::size_t knee = 1;
-    float longest = -1.0f;
-    for (std::size_t k = 1; k + 1 < chain.size(); ++k) {
-      const float length = Length(joints, chain[k]) + Length(joints, chain[k + 1]);
-      if (length > longest) {
-        longest = length;
-        knee = k;
-      }
-    }
-    FoundLeg& leg = legs.legs[side];
-    leg.hip = chain[knee - 1];
-    leg.knee = chain[knee];
-    leg.ankle = chain[knee + 1];
-    leg.ball = knee + 2 < chain.size() ? chain[knee + 2] : -1;
-  }
-  legs.sides_known = false;
   return true;
+}
+
+constexpr const char* kManyLegsText =
+    "the figure has more than two legs; only figures that walk on two legs are supported. If it "
+    "has two, name both ankle joints with options";
+
+Expected<FoundLegs> FindLegsByShape(const FigureShape& figure) {
+  const std::vector<LimbPair> pairs = FindLimbPairs(figure);
+  const LimbPair* best = nullptr;
+  DVec3 up(0.0);
+  for (const LimbPair& pair : pairs) {
+    if (best != nullptr &&
+        (pair.depth > best->depth || (pair.depth == best->depth && pair.length <= best->length))) {
+      continue;
+    }
+    if (HasNameOutsideLegs(figure, pair)) continue;
+    const std::optional<DVec3> direction = CarryingDirection(figure, pair);
+    if (!direction) continue;
+    best = &pair;
+    up = *direction;
+  }
+  if (best == nullptr) {
+    return Fail(ErrorCode::kUnsupported,
+                "no pair of legs was found; name both ankle joints with options");
+  }
+  for (const LimbPair& pair : pairs) {
+    if (IsDisjoint(figure, *best, pair) && pair.length >= kOtherLegShare * best->length &&
+        ReachesTheGround(figure, *best, pair, up)) {
+      return Fail(ErrorCode::kUnsupported, kManyLegsText);
+    }
+  }
+  FoundLegs legs;
+  legs.by_shape = true;
+  legs.root = figure.joints[Index(best->chains[0].front())].parent;
+  int votes = 0;  // Names that say that the first chain is the left one.
+  for (int side = 0; side < 2; ++side) {
+    legs.legs[side] = FindLegInChain(figure, best->chains[side]);
+    for (const int j : best->chains[side]) {
+      const Side named = ReadSide(figure.joints[Index(j)].name);
+      if (named != Side::kNone) votes += (named == Side::kLeft) == (side == 0) ? 1 : -1;
+    }
+  }
+  legs.sides_known = votes != 0;
+  if (votes < 0) std::swap(legs.legs[0], legs.legs[1]);
+  return legs;
+}
+
+std::vector<int> NamedAnkles(const FigureShape& figure, Side side) {
+  std::vector<int> ankles;
+  for (int j = 0; j < static_cast<int>(figure.joints.size()); ++j) {
+    const LegName name = ReadLegName(figure.joints[Index(j)].name);
+    if (name.part == LegPart::kAnkle && name.side == side) ankles.push_back(j);
+  }
+  return ankles;
+}
+
+// Returns true if a joint above `ankle` has a name of the thigh or of the shin.
+bool HasNamedLeg(const FigureShape& figure, int ankle) {
+  for (int j = figure.joints[Index(ankle)].parent; j >= 0; j = figure.joints[Index(j)].parent) {
+    const LegPart part = ReadLegName(figure.joints[Index(j)].name).part;
+    if (part == LegPart::kKnee || part == LegPart::kHip) return true;
+  }
+  return false;
+}
+
+bool FindLegsByName(const FigureShape& figure, FoundLegs& legs) {
+  int best_depth = 0;
+  bool found = false;
+  for (const int left : NamedAnkles(figure, Side::kLeft)) {
+    for (const int right : NamedAnkles(figure, Side::kRight)) {
+      const int depth = Depth(figure.joints, left) + Depth(figure.joints, right);
+      if (found && depth >= best_depth) continue;
+      FoundLegs candidate;
+      if (!FindLegsAbove(figure, {left, right}, candidate)) continue;
+      legs = candidate;
+      best_depth = depth;
+      found = true;
+    }
+  }
+  return found;
+}
+
+// Returns true if names identify a further leg that stands at another place than those found. Rigs
+// may contain copies of the same leg, which are no further legs.
+bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
+  const Pose& pose = PosesOf(figure).front();
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    const FoundLeg& leg = legs.legs[side == Side::kLeft ? 0 : 1];
+    const double length = ChainLength(figure.joints, leg.hip, leg.ankle);
+    for (const int ankle : NamedAnkles(figure, side)) {
+      if (IsBelow(figure.joints, ankle, leg.hip) || !HasNamedLeg(figure, ankle)) continue;
+      int top = ankle;  // The upper end of its thigh or shin.
+      for (int j = ankle; j >= 0; j = figure.joints[Index(j)].parent) {
+        const LegPart part = ReadLegName(figure.joints[Index(j)].name).part;
+        if (part == LegPart::kKnee || part == LegPart::kHip) top = j;
+      }
+      if (IsBelow(figure.joints, leg.hip, top)) continue;
+      const double apart = glm::distance(pose[Index(ankle)], pose[Index(leg.ankle)]);
+      if (apart > kFloorShare * length &&
+          ChainLength(figure.joints, top, ankle) >= kOtherLegShare * length) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+// Returns true if the hands stand on the ground like the feet while the trunk is horizontal, in the
+// rest pose if its legs stand, else in most poses of the motion.
+bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
+  int hands[2] = {-1, -1};
+  for (int j = 0; j < static_cast<int>(figure.joints.size()); ++j) {
+    const std::string& name = figure.joints[Index(j)].name;
+    if (!IsHandName(name) || IsHelperName(name)) continue;
+    const Side side = ReadSide(name);
+    if (side == Side::kNone) continue;
+    int& hand = hands[side == Side::kLeft ? 0 : 1];
+    if (hand < 0) hand = j;
+  }
+  if (hands[0] < 0 || hands[1] < 0) return false;
+  double length = 0.0;  // Of both legs.
+  for (const FoundLeg& leg : legs.legs) length += ChainLength(figure.joints, leg.hip, leg.ankle);
+  const auto legs_up = [&](const Pose& pose) {
+    DVec3 sum(0.0);
+    for (const FoundLeg& leg : legs.legs) sum += pose[Index(leg.hip)] - pose[Index(leg.ankle)];
+    return sum;
+  };
+  const auto on_hands = [&](const Pose& pose, const DVec3& up) {
+    double lowest_foot = INFINITY;
+    double highest_hand = -INFINITY;
+    double lowest_hip = INFINITY;
+    for (int side = 0; side < 2; ++side) {
+      const FoundLeg& leg = legs.legs[side];
+      lowest_foot = std::min(lowest_foot, glm::dot(pose[Index(leg.ankle)], up));
+      lowest_hip = std::min(lowest_hip, glm::dot(pose[Index(leg.hip)], up));
+      highest_hand = std::max(highest_hand, glm::dot(pose[Index(hands[side])], up));
+    }
+    // The shoulder is where the arm leaves the trunk, at most as high as the neck.
+    DVec3 trunk(0.0);
+    for (const int hand : hands) {
+      int top = hand;
+      for (int j = figure.joints[Index(hand)].parent; j >= 0; j = figure.joints[Index(j)].parent) {
+        if (IsNameOutsideLegs(figure.joints[Index(j)].name)) top = j;
+      }
+      trunk += 0.5 * (pose[Index(top)] - pose[Index(legs.root)]);
+    }
+    return highest_hand <= lowest_foot + 0.5 * kFloorShare * length &&
+           glm::dot(trunk, up) < kHorizontalShare * glm::length(trunk) && lowest_hip > lowest_foot;
+  };
+  const DVec3 rest_up = legs_up(figure.rest);
+  const DVec3 rest_axis = AxisVector(NearestAxis(rest_up));
+  if (figure.poses.empty() || glm::dot(rest_up, rest_axis) >= kStandsShare * length) {
+    return on_hands(figure.rest, rest_axis);
+  }
+  DVec3 sum(0.0);
+  for (const Pose& pose : figure.poses) sum += legs_up(pose);
+  const DVec3 up = AxisVector(NearestAxis(sum));
+  const auto count =
+      std::ranges::count_if(figure.poses, [&](const Pose& pose) { return on_hands(pose, up); });
+  return static_cast<double>(count) >= kMostPoses * static_cast<double>(figure.poses.size());
+}
+
+}  // namespace
+
+FigureShape RestShape(std::vector<Joint> joints) {
+  FigureShape figure;
+  figure.joints = std::move(joints);
+  for (const Joint& joint : figure.joints) {
+    const DVec3 parent = joint.parent < 0 ? DVec3(0.0) : figure.rest[Index(joint.parent)];
+    figure.rest.push_back(parent + DVec3(joint.offset_m));
+  }
+  return figure;
+}
+
+bool FindLegsAbove(const FigureShape& figure, const int (&ankles)[2], FoundLegs& legs, int* side) {
+  const std::vector<Joint>& joints = figure.joints;
+  legs = FoundLegs{};
+  int root = ankles[0];
+  while (root >= 0 && !IsBelow(joints, ankles[1], root)) root = joints[Index(root)].parent;
+  if (side != nullptr) *side = 1;
+  if (root < 0 || root == ankles[0] || root == ankles[1]) return false;
+  legs.root = root;
+  for (int s = 0; s < 2; ++s) {
+    if (side != nullptr) *side = s;
+    std::vector<int> chain;
+    for (int j = ankles[s]; j != root; j = joints[Index(j)].parent) chain.push_back(j);
+    std::ranges::reverse(chain);
+    if (chain.size() < 3) return false;
+    legs.legs[s] = FindLegAboveAnkle(figure, chain);
+  }
+  return true;
+}
+
+Expected<FoundLegs> FindLegs(const FigureShape& figure) {
+  FoundLegs legs;
+  if (FindLegsByName(figure, legs)) {
+    if (HasFurtherNamedLeg(figure, legs)) return Fail(ErrorCode::kUnsupported, kManyLegsText);
+    if (StandsOnHands(figure, legs)) {
+      return Fail(ErrorCode::kUnsupported,
+                  "the figure stands on hands and feet with a horizontal trunk; only figures that "
+                  "walk on two legs are supported");
+    }
+    return legs;
+  }
+  Expected<FoundLegs> by_shape = FindLegsByShape(figure);
+  const auto has_leg = [&](Side side) {
+    return std::ranges::any_of(figure.joints, [&](const Joint& joint) {
+      const LegName name = ReadLegName(joint.name);
+      return name.side == side && name.part != LegPart::kBall;
+    });
+  };
+  const bool has_left = has_leg(Side::kLeft);
+  const bool has_right = has_leg(Side::kRight);
+  const bool is_named = by_shape && std::ranges::any_of(by_shape->legs, [&](const FoundLeg& leg) {
+                          return HasNamedLeg(figure, leg.ankle);
+                        });
+  if (has_right && !has_left && !is_named) {
+    return Fail(ErrorCode::kUnsupported,
+                "the figure has a right leg, but no left leg; export both legs, or name both ankle "
+                "joints with options");
+  }
+  if (has_left && !has_right && !is_named) {
+    return Fail(ErrorCode::kUnsupported,
+                "the figure has a left leg, but no right leg; export both legs, or name both ankle "
+                "joints with options");
+  }
+  return by_shape;
 }
 
 }  // namespace stridewire

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "stridewire/base/error.h"
@@ -10,7 +10,18 @@
 
 namespace stridewire {
 
-/// The joints of a leg, as detected from the names or the shape of a skeleton.
+/// The joints of a figure with their positions in the rest pose and in frames of its motion. All of
+/// them are in the axes and the unit of the file.
+struct FigureShape {
+  std::vector<Joint> joints;
+  std::vector<DVec3> rest;                ///< Positions if all rotations are the identity.
+  std::vector<std::vector<DVec3>> poses;  ///< Positions in sampled frames; may be empty.
+};
+
+/// Makes the shape of a figure without motion.
+[[nodiscard]] FigureShape RestShape(std::vector<Joint> joints);
+
+/// The joints of a leg, as detected from the names and the shape of a figure.
 struct FoundLeg {
   int hip = -1;  ///< The joint at the upper end of the thigh.
   int knee = -1;
@@ -20,33 +31,26 @@ struct FoundLeg {
 
 struct FoundLegs {
   FoundLeg legs[2];  ///< The two legs, indexed by Foot.
+  int root = 0;      ///< The lowest joint above both legs.
+  bool by_shape = false;
   /// False if the legs were detected by shape, so that left and right may be swapped.
   bool sides_known = true;
 };
 
-enum class Side { kNone, kLeft, kRight };
-enum class LegPart { kNone, kHip, kKnee, kAnkle, kBall };
+/// Finds the other joints of both legs from their ankles, indexed by Foot. The knee and the hip are
+/// joints with matching names, or else the joints that divide the chain above the ankle into two
+/// long segments. A twist joint, which never bends the leg, does not end a segment. Returns false
+/// if the ankles do not belong to two legs. If `side` is not null, it receives the leg at fault.
+[[nodiscard]] bool FindLegsAbove(const FigureShape& figure, const int (&ankles)[2], FoundLegs& legs,
+                                 int* side = nullptr);
 
-struct LegName {
-  Side side = Side::kNone;
-  LegPart part = LegPart::kNone;
-};
-
-/// Derives side and part of the leg from a joint name: "LeftUpLeg", "lfemur", "Bip01 L Thigh",
-/// "mixamorig:RightToeBase", "foot.R". "LeftHip" is the upper end of the thigh.
-[[nodiscard]] LegName ReadLegName(std::string_view name);
-
-/// Finds the other joints of a leg from its ankle. Knee and hip are the nearest joints above it
-/// with matching names; without such names, the next joints at the ends of bones of non-zero
-/// length. Returns false if there is no knee or hip.
-[[nodiscard]] bool FindLegAbove(const std::vector<Joint>& joints, int ankle, FoundLeg& leg);
-
-/// Detects both legs by joint names. Returns false if a side has no leg.
-[[nodiscard]] bool FindLegsByName(const std::vector<Joint>& joints, FoundLegs& legs);
-
-/// Detects both legs by shape: two chains from the same joint with equal lengths (within 8 %). Of
-/// several pairs it takes the one nearest to the root, and then the longest. Thigh and shin are the
-/// longest pair of successive bones.
-[[nodiscard]] bool FindLegsByShape(const std::vector<Joint>& joints, FoundLegs& legs);
+/// Detects both legs by joint names, and otherwise by shape: two chains of the same joint with
+/// equal lengths (within 8 %) whose ends are below the rest of the body in the motion, or in the
+/// rest pose if there is no motion. Of several pairs it takes the one nearest to the root, and then
+/// the longest.
+///
+/// Errors: kUnsupported if a leg is missing, if there is no pair of legs, or if the figure walks on
+/// more than two legs.
+[[nodiscard]] Expected<FoundLegs> FindLegs(const FigureShape& figure);
 
 }  // namespace stridewire

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "offline/capture/bvh_file.h"
+#include "offline/capture/leg_finder.h"
+#include "stridewire/base/error.h"
+#include "stridewire/base/math.h"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/runtime/clip.h"
+
+namespace stridewire {
+
+/// Number of frames that are sampled to determine the directions and the shape of a figure.
+inline constexpr int kSampledFrames = 64;
+
+/// A joint other than the root whose position channels are replaced by their mean.
+struct AveragedJoint {
+  int joint = 0;
+  double deviation = 0.0;  ///< Largest distance from the mean in any frame, in file units.
+};
+
+/// The figure of a BVH file with its motion, in the axes and the unit of the file. Its root is the
+/// lowest joint above both legs and the upper body, and it contains the motion of all joints above.
+struct BvhFigure {
+  std::vector<Joint> joints;
+  std::vector<EndSite> end_sites;
+  std::vector<int> joint_lines;     ///< Line of the OFFSET of each joint.
+  std::vector<int> end_site_lines;  ///< Line of the OFFSET of each End Site.
+  Clip clip;                        ///< Local rotations; its root positions are not set.
+  std::vector<DVec3> roots;         ///< Root position in each frame.
+  FoundLegs legs;
+  /// Rotation of the joints above the root that never turn. The rest pose of the file contains it.
+  DQuat fixed_turn = DQuat(1.0, 0.0, 0.0, 0.0);
+  int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
+  std::vector<AveragedJoint> averaged;
+  std::vector<std::string> notes;
+
+  /// Returns the direction of the foot in the frame of its ankle: the vector to the toe joint, or
+  /// to the farthest tip.
+  [[nodiscard]] DVec3 FootVector(const FoundLeg& leg) const;
+  /// Returns the offset of the farthest End Site or child of joint `of`.
+  [[nodiscard]] DVec3 FarthestTip(int of) const;
+
+  /// Computes the positions and the world rotations of all joints. Frame -1 is the rest pose.
+  void ComputePose(int frame, std::vector<DVec3>& positions, std::vector<DQuat>& rotations) const;
+};
+
+/// Selects the figure of a file by its legs and merges the joints above it into its root. Other
+/// joints above the root that carry no part of the body are left out, as are other figures and
+/// props. Releases the values of `file`. `fps` is the frame rate of the motion.
+///
+/// Errors: those of FindLegs, with `name` in `where`. kInvalidArgument or kNotFound for an option,
+/// with its name in `where`.
+[[nodiscard]] Expected<BvhFigure> MakeBvhFigure(BvhFile file, const std::string& name, double fps,
+                                                const BvhReadOptions& options);
+
+}  // namespace stridewire

@@ -1,0 +1,334 @@
+#include "offline/capture/figure_axes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/mat3x3.hpp>
+#include <utility>
+#include <vector>
+
+#include "base/check.h"
+#include "offline/base/text.h"
+#include "offline/capture/file_axis.h"
+#include "offline/capture/leg_chain.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kSnapCos = 0.906;  // Directions within 25 degrees of an axis snap to it.
+// A rest pose stands if its legs point this exactly along an axis and are this straight.
+constexpr double kRestCos = 0.8;
+constexpr double kStraightShare = 0.9;
+constexpr double kMotionCos = 0.85;      // Legs hang below the hips in the motion.
+constexpr double kWeakMotionCos = 0.35;  // Legs are rather below the hips, as in crawling.
+// Distances below are in leg lengths.
+constexpr double kAtZero = 0.12;      // Largest height of a floor that is at zero.
+constexpr double kTravels = 0.6;      // A figure moves at least this far along a horizontal axis...
+constexpr double kTravelRatio = 2.0;  // ... and this many times as far as along the up axis.
+constexpr double kClearFeet = 0.5;  // Shortest sum of both unit foot vectors that point somewhere.
+
+DVec3 Unit(const DVec3& v) {
+  const double length = glm::length(v);
+  return length > 1e-12 ? v / length : DVec3(0.0);
+}
+
+DVec3 SnapAxis(const DVec3& v) {
+  const DVec3 axis = AxisVector(NearestAxis(v));
+  return glm::dot(Unit(v), axis) >= kSnapCos ? axis : Unit(v);
+}
+
+// Returns the rotation that takes `left`, `up` and `left` x `up` to +X, +Y and +Z.
+DQuat TurnToOurAxes(const DVec3& left, const DVec3& up) {
+  const DVec3 forward = glm::cross(left, up);
+  return glm::normalize(glm::quat_cast(glm::transpose(glm::dmat3(left, up, forward))));
+}
+
+// A quantile of a list that is sorted in place.
+double Quantile(std::vector<double>& values, double q) {
+  std::ranges::sort(values);
+  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
+}
+
+class AxesFinder {
+ public:
+  AxesFinder(BvhFigure& figure, std::optional<BvhAxis> up, const std::string& name)
+      : figure_(figure), given_up_(up), name_(name) {
+    for (const FoundLeg& leg : figure.legs.legs) {
+      leg_length_ += 0.5 * ChainLength(figure.joints, leg.hip, leg.ankle);
+    }
+    figure.ComputePose(-1, rest_, rotations_);
+    Sample();
+  }
+
+  Expected<FigureAxes> Run() {
+    ReadRestPose();
+    FindUp();
+    const DVec3 world_up = AxisVector(axes_.up);
+    DVec3 rest_up = AxisVector(rest_axis_);
+    if (!rest_stands_) {
+      // In rigs whose bones are all parallel at rest, up is the mean world up in the frame of the
+      // root over the motion.
+      DVec3 sum(0.0);
+      for (const Sampled& sample : samples_) sum += glm::conjugate(sample.root) * world_up;
+      rest_up = SnapAxis(sum);
+      if (rest_up == DVec3(0.0)) rest_up = world_up;
+      Note(
+          "the rest pose does not stand; the upright direction of the root is taken from the "
+          "motion");
+    }
+    if (Status status = FindTurns(world_up, rest_up); !status) {
+      return std::unexpected(std::move(status.error()));
+    }
+    return axes_;
+  }
+
+ private:
+  struct Sampled {
+    std::vector<DVec3> positions;
+    DQuat root;               // World rotation of the root.
+    DVec3 foot = DVec3(0.0);  // Sum of the unit foot vectors, in the frame of the root.
+  };
+
+  void Note(std::string text) { figure_.notes.push_back(std::move(text)); }
+
+  void Sample() {
+    const int frames = figure_.clip.frame_count() - figure_.first_frame;
+    const int step = std::max(1, frames / kSampledFrames);
+    for (int f = figure_.first_frame; f < figure_.clip.frame_count(); f += step) {
+      Sampled& sample = samples_.emplace_back();
+      figure_.ComputePose(f, sample.positions, rotations_);
+      sample.root = rotations_[0];
+      for (const FoundLeg& leg : figure_.legs.legs) {
+        sample.foot += glm::conjugate(sample.root) *
+                       Unit(rotations_[Index(leg.ankle)] * figure_.FootVector(leg));
+      }
+    }
+    STRIDEWIRE_CHECK(!samples_.empty());
+  }
+
+  // Returns the sum of the vectors from both ankles to the hips.
+  DVec3 LegsUp(const std::vector<DVec3>& p) const {
+    DVec3 sum(0.0);
+    for (const FoundLeg& leg : figure_.legs.legs) sum += p[Index(leg.hip)] - p[Index(leg.ankle)];
+    return sum;
+  }
+
+  // The rest pose stands if its legs are straight, parallel to an axis, and below the body.
+  void ReadRestPose() {
+    const DVec3 legs_up = LegsUp(rest_);
+    rest_axis_ = NearestAxis(legs_up);
+    const DVec3 up = AxisVector(rest_axis_);
+    const FoundLeg(&legs)[2] = figure_.legs.legs;
+    const DVec3 hips = 0.5 * (rest_[Index(legs[0].hip)] + rest_[Index(legs[1].hip)]);
+    DVec3 body(0.0);
+    for (int j = 1; j < static_cast<int>(rest_.size()); ++j) {
+      int top = j;
+      while (top > 0 && top != legs[0].hip && top != legs[1].hip) {
+        top = figure_.joints[Index(top)].parent;
+      }
+      if (top <= 0) body += rest_[Index(j)] - hips;
+    }
+    rest_stands_ = glm::dot(Unit(legs_up), up) >= kRestCos && glm::dot(body, up) >= 0.0 &&
+                   glm::length(legs_up) >= kStraightShare * 2.0 * leg_length_;
+  }
+
+  // How the samples of the motion lie along an axis, in file units.
+  struct Extent {
+    double lowest = 0.0;  // Median of the lowest joint.
+    double travel = 0.0;  // Range of the root, without the outermost 5 % at both ends.
+  };
+  Extent ExtentAlong(const DVec3& axis) const {
+    std::vector<double> lowest;
+    std::vector<double> root;
+    for (const Sampled& sample : samples_) {
+      double low = INFINITY;
+      for (const DVec3& p : sample.positions) low = std::min(low, glm::dot(p, axis));
+      lowest.push_back(low);
+      root.push_back(glm::dot(sample.positions[0], axis));
+    }
+    return {Quantile(lowest, 0.5), Quantile(root, 0.95) - Quantile(root, 0.05)};
+  }
+
+  bool IsAtZero(const Extent& extent) const {
+    return std::fabs(extent.lowest) < kAtZero * leg_length_;
+  }
+
+  // Returns true if the figure stands and moves along `up` as in a file whose up axis that is,
+  // instead of lying in a file with the up axis `other`.
+  bool StandsAlong(const DVec3& up, const DVec3& other) const {
+    const Extent along_up = ExtentAlong(up);
+    const Extent along_other = ExtentAlong(other);
+    const bool travels = along_other.travel > kTravels * leg_length_ &&
+                         along_other.travel > kTravelRatio * along_up.travel;
+    return travels || (IsAtZero(along_up) && !IsAtZero(along_other));
+  }
+
+  void FindUp() {
+    if (given_up_) {
+      axes_.up = *given_up_;
+      return;
+    }
+    DVec3 sum(0.0);
+    for (const Sampled& sample : samples_) sum += Unit(LegsUp(sample.positions));
+    const DVec3 mean = sum / static_cast<double>(samples_.size());
+    const BvhAxis motion_axis = NearestAxis(mean);
+    const DVec3 motion_up = AxisVector(motion_axis);
+    const double motion_cos = glm::dot(mean, motion_up);
+    const DVec3 rest_in_world = figure_.fixed_turn * AxisVector(rest_axis_);
+    const BvhAxis rest_axis = NearestAxis(rest_in_world);
+    const DVec3 rest_up = AxisVector(rest_axis);
+    const bool rest_decides = rest_stands_ && glm::dot(rest_in_world, rest_up) >= kRestCos;
+    if (rest_decides && (rest_axis == motion_axis || motion_cos < kMotionCos)) {
+      axes_.up = rest_axis;
+      if (motion_cos < kMotionCos) {
+        Note(Text("up is taken as %s from the rest pose; the motion is inconclusive",
+                  AxisName(rest_axis)));
+      }
+    } else if (rest_decides && !StandsAlong(motion_up, rest_up)) {
+      axes_.up = rest_axis;
+      Note(Text("up is taken as %s from the rest pose; the figure does not stand in the motion",
+                AxisName(rest_axis)));
+    } else if (motion_cos >= kMotionCos) {
+      axes_.up = motion_axis;
+      if (!rest_decides) AvoidLying();
+    } else if (motion_cos >= kWeakMotionCos) {
+      axes_.up = motion_axis;
+      axes_.up_is_certain = false;
+      AvoidLying();
+      Note(Text("up is taken as %s, since the feet are mostly below the hips in that direction",
+                AxisName(axes_.up)));
+    } else {
+      axes_.up_is_certain = false;
+      Note("up is taken as +y; rest pose and motion are inconclusive");
+    }
+    if (axes_.up != BvhAxis::kPlusY) {
+      Note(Text("the up axis of the file is %s; the motion was turned to +y", AxisName(axes_.up)));
+    }
+  }
+
+  // A figure that lies all the time would make its own long axis the up axis. Its feet are then far
+  // from zero along that axis, while its lowest joints are near zero along the usual up axis.
+  void AvoidLying() {
+    const DVec3 up = AxisVector(axes_.up);
+    const Extent along_up = ExtentAlong(up);
+    if (IsAtZero(along_up)) return;
+    for (const BvhAxis usual : {BvhAxis::kPlusY, BvhAxis::kPlusZ}) {
+      const Extent along_usual = ExtentAlong(AxisVector(usual));
+      if (usual == axes_.up || !IsAtZero(along_usual) ||
+          along_usual.travel > kAtZero * leg_length_) {
+        continue;
+      }
+      Note(Text("up is taken as %s; the figure lies on the floor in the motion", AxisName(usual)));
+      axes_.up = usual;
+      axes_.up_is_certain = false;
+      return;
+    }
+  }
+
+  // Returns the mean over the motion of a vector in the frame of the root.
+  template <typename Vector>
+  DVec3 MeanInRoot(Vector vector) const {
+    DVec3 sum(0.0);
+    for (const Sampled& sample : samples_) sum += glm::conjugate(sample.root) * vector(sample);
+    return sum / static_cast<double>(samples_.size());
+  }
+
+  // The direction of the feet in the frame of the root, level: over the motion, or else at rest.
+  // Its length is at most 2.
+  template <typename Level>
+  DVec3 FindFeet(const Level& level) const {
+    DVec3 feet(0.0);
+    for (const Sampled& sample : samples_) feet += level(sample.foot);
+    feet /= static_cast<double>(samples_.size());
+    if (glm::length(feet) >= kClearFeet) return feet;
+    DVec3 at_rest(0.0);
+    for (const FoundLeg& leg : figure_.legs.legs) {
+      at_rest += Unit(level(figure_.FootVector(leg)));
+    }
+    return glm::length(at_rest) > glm::length(feet) ? at_rest : feet;
+  }
+
+  // The direction from the right leg to the left one, level, from the first pair of joints that are
+  // apart.
+  template <typename Level>
+  DVec3 FindLeft(const Level& level) const {
+    const FoundLeg(&legs)[2] = figure_.legs.legs;
+    const double least = 1e-6 * leg_length_;
+    for (const int FoundLeg::* part : {&FoundLeg::hip, &FoundLeg::knee, &FoundLeg::ankle}) {
+      const int left = legs[0].*part;
+      const int right = legs[1].*part;
+      const DVec3 at_rest = level(rest_[Index(left)] - rest_[Index(right)]);
+      if (rest_stands_ || part == &FoundLeg::hip) {
+        if (glm::length(at_rest) > least) return at_rest;
+      }
+      const DVec3 in_motion = level(MeanInRoot([&](const Sampled& sample) {
+        return sample.positions[Index(left)] - sample.positions[Index(right)];
+      }));
+      if (glm::length(in_motion) > least) return in_motion;
+    }
+    return DVec3(0.0);
+  }
+
+  Status FindTurns(const DVec3& world_up, const DVec3& rest_up) {
+    STRIDEWIRE_CHECK(std::fabs(glm::length(world_up) - 1.0) < 1e-6 &&
+                     std::fabs(glm::length(rest_up) - 1.0) < 1e-6);
+    const auto level = [&](const DVec3& v) { return v - glm::dot(v, rest_up) * rest_up; };
+    FoundLegs& legs = figure_.legs;
+    const DVec3 feet = FindFeet(level);
+    const bool feet_are_clear = glm::length(feet) >= kClearFeet;
+    DVec3 across = FindLeft(level);
+    if (!legs.sides_known) {
+      // If forward is the direction of the feet, left is up x forward.
+      if (!feet_are_clear) {
+        Note("left and right are guessed, since the feet have no clear direction");
+      }
+      if (glm::dot(across, glm::cross(rest_up, feet)) < 0.0) {
+        std::swap(legs.legs[0], legs.legs[1]);
+        across = -across;
+      }
+    }
+    DVec3 left = legs.sides_known || !feet_are_clear ? across : glm::cross(rest_up, feet);
+    if (glm::length(left) < 1e-9) left = glm::cross(rest_up, feet);
+    if (glm::length(left) < 1e-9) {
+      return Fail(ErrorCode::kUnsupported,
+                  "both legs are at the same place and the feet have no direction, so left and "
+                  "right are unknown; export a figure whose legs are apart",
+                  name_);
+    }
+    left = Unit(level(SnapAxis(left)));
+    if (glm::dot(glm::cross(left, rest_up), feet) < 0.0) {
+      Note("the feet point backwards; left and right may be swapped");
+    }
+    axes_.joint_turn = TurnToOurAxes(left, rest_up);
+    // Joints above the root may turn the whole figure by a fixed rotation.
+    const DQuat turn = glm::normalize(axes_.joint_turn * glm::conjugate(figure_.fixed_turn));
+    if ((turn * world_up).y > 0.999) {
+      axes_.world_turn = turn;
+    } else {
+      const DVec3 other = std::fabs(world_up.x) > 0.9 ? DVec3(0, 0, 1) : DVec3(1, 0, 0);
+      axes_.world_turn =
+          TurnToOurAxes(Unit(other - glm::dot(other, world_up) * world_up), world_up);
+    }
+    return {};
+  }
+
+  BvhFigure& figure_;
+  std::optional<BvhAxis> given_up_;
+  const std::string& name_;
+  double leg_length_ = 0.0;  // Mean of both legs.
+  std::vector<DVec3> rest_;
+  std::vector<DQuat> rotations_;  // Scratch of ComputePose.
+  std::vector<Sampled> samples_;
+  bool rest_stands_ = false;
+  BvhAxis rest_axis_ = BvhAxis::kPlusY;  // Direction of the resting legs, in the frame of the root.
+  FigureAxes axes_;
+};
+
+}  // namespace
+
+Expected<FigureAxes> FindFigureAxes(BvhFigure& figure, std::optional<BvhAxis> up,
+                                    const std::string& name) {
+  return AxesFinder(figure, up, name).Run();
+}
+
+}  // namespace stridewire
