@@ -4,7 +4,7 @@
 # are installed already.
 #
 #   deploy/install_deps.sh               # everything for the build, the tests and the demo
-#   deploy/install_deps.sh --lint        # also the linters that .ci/run needs
+#   deploy/install_deps.sh --lint        # also the linters and debootstrap, which .ci/run needs
 #   deploy/install_deps.sh --no-browser  # without Chromium, which only the viewer's tests need
 #   deploy/install_deps.sh --list        # print the package names, one per line, and exit
 #
@@ -50,6 +50,7 @@ lint=(
   clang-format-19
   clang-tidy-19
   codespell  # Checks the spelling for .ci/prose.
+  debootstrap  # Installs the bare Debian of .ci/bare_root.
 )
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }

@@ -6,7 +6,8 @@ cd "$1"
 failed=0
 complain() { echo "FAILED: $*" >&2; failed=1; }
 
-for script in deploy/install_deps.sh deploy/demo.sh tests/run.sh tests/bench/largest_crowd.sh; do
+for script in deploy/install_deps.sh deploy/demo.sh tests/run.sh tests/bench/largest_crowd.sh \
+              .ci/bare_root .ci/tidy; do
   [[ -x $script ]] || complain "$script is not executable"
   bash -n "$script" || complain "$script does not parse"
   help=$("$script" --help) || complain "$script --help ended with $?"
