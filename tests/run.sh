@@ -13,8 +13,8 @@
 #   --werror         treat compiler warnings as errors, as .ci/run does
 #   --no-install     do not install packages
 #
-# The last lines are the number of skipped tests with a hint how to enable each of them, and the
-# totals that ctest prints.
+# The last line contains the totals that ctest prints, the number of skipped tests, and what to do to
+# run these.
 set -euo pipefail
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
@@ -92,22 +92,21 @@ skip_reasons() {
     is_output && name in skipped && !/^\[|^Note:/' \
     - "build/$preset/Testing/Temporary/LastTest.log"
 }
-# Prints what to install for the skipped tests.
+# Prints what to do to run the skipped tests, in one line.
 skip_hints() {
-  local reasons captures
+  local reasons captures hints=
   reasons=$(skip_reasons)
   captures=$(grep -i 'captures' <<<"$reasons" || true)
   if grep -q 'assimp-testmodels' <<<"$reasons"; then
-    echo "  assimp-testmodels is not installed: run deploy/install_deps.sh"
+    hints="run deploy/install_deps.sh; "
+  elif grep -qi 'chromium' <<<"$reasons"; then
+    hints="run deploy/install_deps.sh without --no-browser; "
   fi
   if grep -qv 'assimp-testmodels' <<<"${captures:-assimp-testmodels}"; then
-    echo "  captures are missing: copy BVH files of the CMU database (mocap.cs.cmu.edu) to" \
-         "../shared/mocap/cmu, one folder per subject"
+    hints+="copy BVH files of mocap.cs.cmu.edu to ../shared/mocap/cmu, one folder per subject; "
   fi
-  if grep -qi 'chromium' <<<"$reasons"; then
-    echo "  Chromium is not installed: run deploy/install_deps.sh without --no-browser"
-  fi
-  echo "  The log contains the reason for each skipped test."
+  hints=${hints:-see the reasons in the log; }
+  echo "${hints%; }"
 }
 
 totals=$(grep -E 'tests passed, [0-9]+ tests failed out of' "build/$preset/ctest.txt" |
@@ -120,11 +119,8 @@ if ! $with_npm; then
   echo "npm is not installed, so the tests of the web client and the viewer were not built:" \
        "run deploy/install_deps.sh"
 fi
-if ((skipped > 0)); then
-  echo "Some tests were skipped. What they need:"
-  skip_hints
-fi
-echo "skipped: $skipped"
-# Scripts parse the last line. It has the form that ctest prints.
-echo "${totals:-ctest ended with exit code $status before it ran a test}"
+hint=
+if ((skipped > 0)); then hint=" (to run them: $(skip_hints))"; fi
+# Scripts parse the last line. It begins like the one that ctest prints.
+echo "${totals:-ctest ended with exit code $status before it ran a test}, $skipped skipped$hint"
 exit "$status"
