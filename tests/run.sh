@@ -13,8 +13,8 @@
 #   --werror         treat compiler warnings as errors, as .ci/run does
 #   --no-install     do not install packages
 #
-# The last line contains the totals that ctest prints, the number of skipped tests, and what to do to
-# run these.
+# The last line contains the totals that ctest prints, the number of skipped tests, and what to do
+# to run these.
 set -euo pipefail
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
