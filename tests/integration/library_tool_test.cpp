@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "bvh_text.h"
 #include "child_process.h"
 #include "run_program.h"
 #include "scratch_folder.h"
@@ -1059,6 +1060,36 @@ TEST_F(LibraryTool, FailsIfStdoutCannotBeWritten) {
       "/bin/sh", {"-c", "exec \"$0\" inspect builtin --json >/dev/full", STRIDEWIRE_LIBRARY_TOOL});
   EXPECT_EQ(result.exit_code, 1);
   ExpectSentence(result.err, "cannot write");
+}
+
+// The rest pose of these files does not stand, so that each motion suggests an up axis. One figure
+// lies on a table all the time.
+TEST_F(LibraryTool, FilesOfABuildAgreeOnTheirUpAxis) {
+  test::BvhText figure;
+  figure.folded = true;
+  const std::string standing = figure.Text();
+  std::string lying = standing;
+  std::size_t row = lying.find('\n', lying.find("Frame Time")) + 1;
+  for (; row < lying.size(); row = lying.find('\n', row) + 1) {
+    std::size_t end = row;  // The first six numbers of the row are those of the root.
+    for (int number = 0; number < 6; ++number) end = lying.find(' ', end + 1);
+    lying.replace(row, end - row, "0 1 1.5 0 -90 0");
+  }
+  std::ofstream(folder_.File("lying.bvh")) << lying;
+  std::ofstream(folder_.File("a.bvh")) << standing;
+  std::ofstream(folder_.File("b.bvh")) << standing;
+  const auto notes_of_lying = [&](const Arguments& others) {
+    const ProgramResult result =
+        Tool(Join({"build", "--json", "--out", Out(), folder_.File("lying.bvh")}, others));
+    const json files = ParseOutput(result.out)["files"];
+    EXPECT_EQ(files.size(), 1 + others.size());
+    EXPECT_EQ(files[0]["path"], folder_.File("lying.bvh"));
+    return files[0]["notes"].dump();
+  };
+  EXPECT_THAT(notes_of_lying({}), HasSubstr("the up axis of the file is -z"));
+  const std::string agreed = notes_of_lying({folder_.File("a.bvh"), folder_.File("b.bvh")});
+  EXPECT_THAT(agreed, HasSubstr("up is taken as +y like in other files with these joints"));
+  EXPECT_THAT(agreed, Not(HasSubstr("the up axis of the file is")));
 }
 
 }  // namespace

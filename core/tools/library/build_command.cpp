@@ -2,10 +2,13 @@
 #include <future>
 #include <optional>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "build_report.h"
 #include "command_line.h"
 #include "commands.h"
+#include "offline/capture/conventions.h"
 #include "offline/extract/assemble.h"
 #include "progress.h"
 #include "stridewire/offline/bvh_reader.h"
@@ -54,6 +57,74 @@ std::string ParseKinds(const std::string& kinds, AssembleOptions& options) {
   return options.steps || options.jumps ? "" : "--kinds: expected step or jump, got nothing";
 }
 
+// The files of a build in the order of the command line, and the movements found in them.
+struct Captures {
+  explicit Captures(const AssembleOptions& options) : assembler(options) {}
+
+  LibraryAssembler assembler;                // Contains the readable files only.
+  std::vector<Extraction> unreadable;        // Contains only path and error.
+  std::vector<bool> is_readable;             // Of each file.
+  std::vector<FileConventions> conventions;  // Of the readable files.
+};
+
+// Reads the files with options of their own. Returns nothing if the user interrupts the program.
+std::optional<Captures> ReadCaptures(const std::vector<std::string>& paths,
+                                     const std::vector<BvhReadOptions>& read,
+                                     const AssembleOptions& options, Progress& progress) {
+  Captures captures(options);
+  // Reads the next file while the assembler extracts movements from the current one.
+  const auto start_reading = [&](std::size_t i) {
+    return i < paths.size()
+               ? std::async(
+                     std::launch::async, [&read, &paths, i] { return ReadBvh(paths[i], read[i]); })
+               : std::future<Expected<Capture>>();
+  };
+  std::future<Expected<Capture>> reading = start_reading(0);
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    progress.Update(static_cast<double>(i) / static_cast<double>(paths.size() + 1));
+    const auto capture = reading.get();
+    reading = start_reading(i + 1);
+    if (InterruptSignal::IsRaised()) return std::nullopt;
+    captures.is_readable.push_back(capture.has_value());
+    if (capture) {
+      captures.conventions.push_back(ConventionsOf(*capture));
+      captures.assembler.Add(*capture);
+    } else {
+      captures.unreadable.emplace_back().path = paths[i];
+      captures.unreadable.back().error = Describe(NameOption(capture.error()));
+    }
+  }
+  return captures;
+}
+
+// Reads all files so that they agree on up axis and unit. Files that disagree are rare, and are
+// found only after all files were read, so that it then reads all files again.
+std::optional<Captures> ReadAgreeingCaptures(const std::vector<std::string>& paths,
+                                             const BvhReadOptions& read,
+                                             const AssembleOptions& options, Progress& progress) {
+  std::vector<BvhReadOptions> own(paths.size(), read);
+  std::optional<Captures> captures = ReadCaptures(paths, own, options, progress);
+  if (!captures) return std::nullopt;
+  const std::vector<AgreedConventions> agreed = AgreeOnConventions(captures->conventions);
+  bool disagree = false;
+  std::size_t readable = 0;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (!captures->is_readable[i]) continue;
+    const AgreedConventions& file = agreed[readable++];
+    if (file.up) own[i].up = file.up;
+    if (file.unit_m) own[i].unit_m = file.unit_m;
+    disagree |= file.up || file.unit_m;
+  }
+  if (disagree) captures = ReadCaptures(paths, own, options, progress);
+  if (!captures) return std::nullopt;
+  // With other options, a file that was readable may be rejected; its notes are then not needed.
+  if (captures->conventions.size() == agreed.size()) {
+    for (std::size_t i = 0; i < agreed.size(); ++i)
+      captures->assembler.AddNotes(i, agreed[i].notes);
+  }
+  return captures;
+}
+
 }  // namespace
 
 int RunBuild(const BuildCommand& command) {
@@ -97,35 +168,21 @@ int RunBuild(const BuildCommand& command) {
   const InterruptSignal interrupt_signal;
   Progress progress("building");
   const char* const stopped = "interrupted; no file written";
-  LibraryAssembler assembler(options);
-  // Reads the next file while the assembler extracts movements from the current one.
-  const auto start_reading = [&](std::size_t i) {
-    return i < command.files.size()
-               ? std::async(
-                     std::launch::async,
-                     [&read, &path = command.files[i]] { return ReadBvh(path, read); })
-               : std::future<Expected<Capture>>();
-  };
-  std::future<Expected<Capture>> reading = start_reading(0);
-  for (std::size_t i = 0; i < command.files.size(); ++i) {
-    const std::string& path = command.files[i];
-    progress.Update(static_cast<double>(i) / static_cast<double>(command.files.size() + 1));
-    const auto capture = reading.get();
-    reading = start_reading(i + 1);
-    if (InterruptSignal::IsRaised()) return report.Fail(stopped, kExitFailure);
-    Extraction unreadable;
-    if (!capture) {
-      unreadable.path = path;
-      unreadable.error = Describe(NameOption(capture.error()));
-    }
-    const Extraction& extraction = capture ? assembler.Add(*capture) : unreadable;
-    progress.Clear();
-    report.AddFile(extraction, options);
+  const std::optional<Captures> captures =
+      ReadAgreeingCaptures(command.files, read, options, progress);
+  if (!captures) return report.Fail(stopped, kExitFailure);
+  progress.Clear();
+  std::size_t readable = 0;
+  std::size_t unreadable = 0;
+  for (const bool is_readable : captures->is_readable) {
+    report.AddFile(
+        is_readable ? captures->assembler.files()[readable++] : captures->unreadable[unreadable++],
+        options);
   }
 
   progress.Update(static_cast<double>(command.files.size()) /
                   static_cast<double>(command.files.size() + 1));
-  const auto raw = assembler.Assemble();
+  const auto raw = captures->assembler.Assemble();
   if (!raw) return report.Fail(Describe(raw.error()), kExitBadInput);
   LibraryBuilder builder = command.all ? LibraryBuilder() : LibraryBuilder::Selecting();
   if (!command.all) builder.selection.max_pose_error_m = command.max_pose_error_m;

@@ -17,16 +17,21 @@ namespace stridewire {
 /// A direction along one of the file's own axes.
 enum class BvhAxis : std::uint8_t { kPlusX, kMinusX, kPlusY, kMinusY, kPlusZ, kMinusZ };
 
+/// What determined the up axis of a capture. `kGuess`: the figure stands neither in the rest pose
+/// nor in the motion.
+enum class UpSource : std::uint8_t { kOption, kRestPose, kMotion, kGuess };
+
 /// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y
 /// up, facing +Z at identity rotations.
 struct Capture {
   std::string path;   ///< Path of the file, as passed by the caller.
   Skeleton skeleton;  ///< Skeleton whose legs have both been identified.
   Clip clip;
-  double unit_m = 1.0;           ///< Length of one file unit in metres, detected or given.
+  double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
+  /// False: no common unit fits the legs, so that `unit_m` was estimated from their length.
+  bool unit_is_common = true;
   BvhAxis up = BvhAxis::kPlusY;  ///< The up axis of the file, detected or given.
-  /// False: the figure stands neither in the rest pose nor in the motion, so that `up` is a guess.
-  bool up_is_certain = true;
+  UpSource up_source = UpSource::kOption;
   int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
   std::vector<std::string> notes;  ///< Assumptions and repairs of the reader, one sentence each.
 };

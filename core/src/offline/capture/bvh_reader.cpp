@@ -109,7 +109,7 @@ class Reader {
     if (!axes) return std::unexpected(std::move(axes.error()));
     axes_ = *axes;
     capture_.up = axes_.up;
-    capture_.up_is_certain = axes_.up_is_certain;
+    capture_.up_source = axes_.up_source;
     capture_.first_frame = figure_.first_frame;
     return {};
   }
@@ -153,6 +153,7 @@ class Reader {
       standing -= 0.5 * std::min(0.0, (axes_.joint_turn * figure_.FootVector(found)).y);
     }
     if (!(standing > 0.5 * leg)) standing = leg;
+    capture_.unit_is_common = false;
     capture_.unit_m = kStandingHipsM / standing;
     Note(
         Text("no common unit gives legs of 0.68 to 1.0 m; a unit of %.5g m puts the hips of the "

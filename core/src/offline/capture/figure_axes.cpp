@@ -180,25 +180,28 @@ class AxesFinder {
     const bool rest_decides = rest_stands_ && glm::dot(rest_in_world, rest_up) >= kRestCos;
     if (rest_decides && (rest_axis == motion_axis || motion_cos < kMotionCos)) {
       axes_.up = rest_axis;
+      axes_.up_source = UpSource::kRestPose;
       if (motion_cos < kMotionCos) {
         Note(Text("up is taken as %s from the rest pose; the motion is inconclusive",
                   AxisName(rest_axis)));
       }
     } else if (rest_decides && !StandsAlong(motion_up, rest_up)) {
       axes_.up = rest_axis;
+      axes_.up_source = UpSource::kRestPose;
       Note(Text("up is taken as %s from the rest pose; the figure does not stand in the motion",
                 AxisName(rest_axis)));
     } else if (motion_cos >= kMotionCos) {
       axes_.up = motion_axis;
+      axes_.up_source = UpSource::kMotion;
       if (!rest_decides) AvoidLying();
     } else if (motion_cos >= kWeakMotionCos) {
       axes_.up = motion_axis;
-      axes_.up_is_certain = false;
+      axes_.up_source = UpSource::kGuess;
       AvoidLying();
       Note(Text("up is taken as %s, since the feet are mostly below the hips in that direction",
                 AxisName(axes_.up)));
     } else {
-      axes_.up_is_certain = false;
+      axes_.up_source = UpSource::kGuess;
       Note("up is taken as +y; rest pose and motion are inconclusive");
     }
     if (axes_.up != BvhAxis::kPlusY) {
@@ -220,7 +223,7 @@ class AxesFinder {
       }
       Note(Text("up is taken as %s; the figure lies on the floor in the motion", AxisName(usual)));
       axes_.up = usual;
-      axes_.up_is_certain = false;
+      axes_.up_source = UpSource::kGuess;
       return;
     }
   }

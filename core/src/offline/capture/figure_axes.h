@@ -12,8 +12,8 @@ namespace stridewire {
 
 /// Rotations from the axes of a file to ours: +Y up, facing +Z at identity rotations.
 struct FigureAxes {
-  BvhAxis up = BvhAxis::kPlusY;  ///< The up axis of the file.
-  bool up_is_certain = true;     ///< False: neither the rest pose nor the motion stands.
+  BvhAxis up = BvhAxis::kPlusY;                  ///< The up axis of the file.
+  UpSource up_source = UpSource::kOption;        ///< What determined `up`.
   DQuat world_turn = DQuat(1.0, 0.0, 0.0, 0.0);  ///< Turns the world of the file.
   DQuat joint_turn = DQuat(1.0, 0.0, 0.0, 0.0);  ///< Turns the frames of the joints.
 };

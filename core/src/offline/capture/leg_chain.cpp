@@ -171,7 +171,8 @@ FoundLeg FindLegAboveAnkle(const FigureShape& figure, const std::vector<int>& jo
     if (may_be_knee(i)) knee = i;
   }
   if (knee == 0) knee = 1;
-  // The thigh may consist of several joints in a line. Its upper end is the first one of them.
+  // The thigh may consist of several joints in a line. Its upper end is the first one of them that
+  // has a name of the leg.
   std::size_t thigh = 0;
   for (const std::size_t end : chain.ends()) {
     if (end < knee) thigh = end;
@@ -179,7 +180,9 @@ FoundLeg FindLegAboveAnkle(const FigureShape& figure, const std::vector<int>& jo
   std::size_t hip = thigh;
   bool has_name = false;
   for (std::size_t i = 0; i < knee; ++i) {
-    if (PartOf(figure, nodes[i]) != LegPart::kHip) continue;
+    const LegPart part = PartOf(figure, nodes[i]);
+    const bool is_above_a_knee = part == LegPart::kKnee && i == thigh;
+    if (part != LegPart::kHip && !is_above_a_knee) continue;
     if (!has_name || hip < thigh) hip = i;
     has_name = true;
   }

@@ -265,6 +265,11 @@ const Extraction& LibraryAssembler::Add(const Capture& capture) {
   return file;
 }
 
+void LibraryAssembler::AddNotes(std::size_t file, std::span<const std::string> notes) {
+  STRIDEWIRE_CHECK(file < files_.size());
+  files_[file].notes.insert(files_[file].notes.end(), notes.begin(), notes.end());
+}
+
 Expected<RawLibrary> LibraryAssembler::Assemble() const {
   return Assembler(options_, skeleton_, files_).Run();
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
@@ -45,6 +46,9 @@ class LibraryAssembler {
 
   /// Extracts the movements of a capture. The reference is valid until the next call of Add.
   const Extraction& Add(const Capture& capture);
+
+  /// Appends notes to the result of a capture; `file` counts in the order of Add.
+  void AddNotes(std::size_t file, std::span<const std::string> notes);
 
   /// The results in the order of Add.
   [[nodiscard]] std::span<const Extraction> files() const { return files_; }

@@ -389,7 +389,7 @@ TEST(BvhFigure, KeepsTheUpAxisOfARestPoseThatStands) {
       }
       const Capture capture = Read(figure.Text());
       EXPECT_EQ(capture.up, BvhAxis::kPlusY);
-      EXPECT_TRUE(capture.up_is_certain);
+      EXPECT_EQ(capture.up_source, UpSource::kRestPose);
       EXPECT_THAT(capture.notes, Contains(HasSubstr("up is taken as +y from the rest pose")));
       EXPECT_NEAR(capture.clip.frame(5).root_position_m.y, crawls ? 0.45 : 0.12, 1e-5);
     }

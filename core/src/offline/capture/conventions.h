@@ -1,0 +1,43 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stridewire/offline/bvh_reader.h"
+
+namespace stridewire {
+
+/// What the reader assumed about a file, and what that depends on.
+struct FileConventions {
+  std::string path;
+  BvhAxis up = BvhAxis::kPlusY;
+  UpSource up_source = UpSource::kOption;
+  double unit_m = 1.0;
+  bool unit_is_common = true;  ///< False: the unit was estimated from the legs.
+  double leg_m = 0.0;          ///< Length of the legs.
+  std::vector<std::string> joint_names;
+};
+
+[[nodiscard]] FileConventions ConventionsOf(const Capture& capture);
+
+/// The conventions that a file should be read with so that it agrees with the other files.
+struct AgreedConventions {
+  std::optional<BvhAxis> up;       ///< Empty: as it was read.
+  std::optional<double> unit_m;    ///< Empty: as it was read.
+  std::vector<std::string> notes;  ///< What differs from the other files, one sentence each.
+};
+
+/// Compares the files of one build. `files` contains the files that could be read.
+///
+/// - Files with the same joint names have the same up axis. If the rest pose of a file does not
+///   determine it, it is the axis of most of them. Files whose rest pose determines it count first.
+/// - A file whose unit was estimated gets the unit of a file with the same joint names and a common
+///   unit, if its legs are then between 0.5 and 1.2 m long.
+/// - Notes state which axis or unit a file got from the others, and which of them still differ from
+///   those of the first file.
+[[nodiscard]] std::vector<AgreedConventions> AgreeOnConventions(
+    std::span<const FileConventions> files);
+
+}  // namespace stridewire
