@@ -37,12 +37,16 @@ std::optional<double> KneeDegrees(const LegRig::Side& side, const LegPose& leg) 
   return kDegreesPerRadian * std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
-// Returns the height of a sole above level ground.
-double SoleHeight(const LegRig::Side& side, const LegPose& leg, double root_y_m, bool has_stand) {
+// Heights of the ball and of the lowest point of a sole above level ground.
+struct SoleHeights {
+  double ball_m = 0.0;
+  double lowest_m = 0.0;
+};
+
+SoleHeights HeightsOf(const LegRig::Side& side, const LegPose& leg, double root_y_m) {
   const double ball_m = root_y_m + leg.ball_m.y - side.ball_height_m;
-  if (!has_stand) return ball_m;
-  return std::min({ball_m, root_y_m + leg.heel_m.y - side.ball_height_m,
-                   root_y_m + leg.toe_tip_m.y - side.toe_height_m});
+  return {ball_m, std::min({ball_m, root_y_m + leg.heel_m.y - side.ball_height_m,
+                            root_y_m + leg.toe_tip_m.y - side.toe_height_m})};
 }
 
 // Returns how far a foot hovers during a contact, from the heights of its sole in every frame.
@@ -74,9 +78,9 @@ void SurveyLegs(const MotionLibrary& library, const Synthesis& synthesis, bool h
       if (const auto knee_deg = KneeDegrees(side, leg)) {
         deviations.knee_deg = std::max(deviations.knee_deg.value_or(0.0), *knee_deg);
       }
-      heights_m.push_back(
-          SoleHeight(side, leg, static_cast<double>(pose.root_position_m.y), has_stand));
-      deviations.sink_m = std::max(deviations.sink_m, -heights_m.back());
+      const SoleHeights heights = HeightsOf(side, leg, static_cast<double>(pose.root_position_m.y));
+      heights_m.push_back(has_stand ? heights.lowest_m : heights.ball_m);
+      deviations.sink_m = std::max(deviations.sink_m, -heights.ball_m);
       ++deviations.feet;
     }
     for (const MovementRecord& movement : synthesis.movements) {

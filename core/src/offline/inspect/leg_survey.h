@@ -13,7 +13,7 @@ struct LegDeviations {
   /// Empty if no leg is ever bent.
   std::optional<double> knee_deg;
   double hover_m = 0.0;  ///< Height of a standing sole above level ground.
-  double sink_m = 0.0;   ///< Depth of any sole below level ground.
+  double sink_m = 0.0;   ///< Depth of any ball of a foot below level ground.
   int feet = 0;          ///< Number of feet measured, one per leg and frame.
 };
 
@@ -22,10 +22,13 @@ struct LegDeviations {
 /// - The direction of a knee is that from the line between hip and ankle to the knee. It is
 ///   compared with that from ankle to ball, both seen along that line. Legs that are bent by less
 ///   than about 20 degrees have no direction.
-/// - Heights are relative to the stand pose. The height of a sole is that of the lowest of heel,
-///   ball and tip of the toes. If `has_stand` is false, the stand pose is a moment in mid-stride,
-///   in which heels and toes are not on the ground. Then only the ball is measured, and a standing
-///   foot counts as hovering only if its ball never comes down while it stands.
+/// - Heights are relative to the stand pose. The depth of a sole is measured at the ball of the
+///   foot. Skeletons have no heel joint, and their toe tips dip several centimetres below the
+///   ground even in captures.
+/// - The height of a standing sole is that of the lowest of heel, ball and tip of the toes, so that
+///   a foot may roll over its heel and its toes. If `has_stand` is false, the stand pose is a
+///   moment in mid-stride, in which heels and toes are not on the ground. Then a standing foot
+///   hovers only if its ball never comes down while it stands.
 void SurveyLegs(const MotionLibrary& library, const Synthesis& synthesis, bool has_stand,
                 LegDeviations& deviations);
 

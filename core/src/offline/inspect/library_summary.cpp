@@ -329,8 +329,11 @@ std::vector<std::string> DescribeSummary(const LibrarySummary& summary) {
   if (!summary.jumps.is_available()) {
     lines.emplace_back("Jumps: none.");
   } else {
-    std::string jumps = "Jumps: " + Metres(summary.jumps.range) + " long, landing " +
-                        RangeText(summary.jump_up_m, "%.2f", " m") + " above the start";
+    const bool is_level = summary.jump_up_m.min > -0.005 && summary.jump_up_m.max < 0.005;
+    std::string jumps =
+        "Jumps: " + Metres(summary.jumps.range) + " long, landing " +
+        (is_level ? std::string("as high as they start")
+                  : RangeText(summary.jump_up_m, "%.2f", " m") + " above the start");
     if (summary.jump_turn_deg.max - summary.jump_turn_deg.min >= 1.0) {
       jumps += ", turning " + RangeText(summary.jump_turn_deg, "%.0f", " degrees");
     }

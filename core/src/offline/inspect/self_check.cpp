@@ -138,6 +138,7 @@ class Checker {
         check, worst_m,
         Text("Three steps of %.2f m land within %.3f m of where they should.", steps_m_, worst_m));
     if (const char* const wrong = WrongOrder(); wrong != nullptr) {
+      check.measured.reset();  // The steps that were made are not those that were requested.
       Fail(check, Text("Three steps of %.2f m are not possible: ", steps_m_) + wrong, WalkAdvice());
     } else if (worst != nullptr) {
       Fail(
@@ -167,14 +168,14 @@ class Checker {
   [[nodiscard]] const char* WrongOrder() const {
     const MovementRecord* previous = nullptr;
     for (const MovementRecord& record : steps_->movements) {
-      if (record.request_id > kSteps) break;
       if (!IsStep(record.kind)) continue;
-      if (record.request_id == 0 && previous != nullptr && previous->request_id < kSteps) {
+      if (record.request_id == 0 && previous != nullptr) {
         return "additional steps are necessary between them.";
       }
       if (record.request_id != 0 && previous != nullptr && previous->kind == record.kind) {
         return "the same foot has to step twice in a row.";
       }
+      if (record.request_id == kSteps) break;
       previous = &record;
     }
     return nullptr;
@@ -220,19 +221,18 @@ class Checker {
     STRIDEWIRE_CHECK(played->walks.size() == 1);
     const WalkRecord& record = played->walks.front();
     const double left_m = std::hypot(record.base.position_m.x, record.base.position_m.z - kGoalM);
-    const auto step_count = std::ranges::count_if(
-        played->movements, [](const MovementRecord& m) { return IsStep(m.kind); });
+    const auto step_count = static_cast<int>(std::ranges::count_if(
+        played->movements, [](const MovementRecord& m) { return IsStep(m.kind); }));
+    const char* const steps = step_count == 1 ? "step" : "steps";
     if (record.arrived) {
       Judge(check, left_m,
-            Text("The walk arrives after %d steps, %.3f m from its goal.",
-                 static_cast<int>(step_count), left_m));
+            Text("The walk arrives after %d %s, %.3f m from its goal.", step_count, steps, left_m));
       return;
     }
     if (!has_stop()) check.bound = 0.5 * steps_m_;
     check.measured = left_m;
     const std::string text =
-        Text("The walk ends after %d steps, %.2f m from its goal: ", static_cast<int>(step_count),
-             left_m) +
+        Text("The walk ends after %d %s, %.2f m from its goal: ", step_count, steps, left_m) +
         record.reason + ".";
     if (!has_stop() && left_m <= check.bound) {
       check.verdict = CheckVerdict::kPassed;
@@ -262,8 +262,8 @@ class Checker {
     CheckResult& soles = Add("soles", "Soles on the ground", kMaxSoleM, "m");
     if (!SaysThereIsNothingToMeasure(soles)) {
       Judge(soles, std::max(legs_.hover_m, legs_.sink_m),
-            Text("Standing soles are at most %.3f m above the ground, and soles at most %.3f m "
-                 "below it.",
+            Text("Standing soles are at most %.3f m above the ground, and the balls of the feet at "
+                 "most %.3f m below it.",
                  legs_.hover_m, legs_.sink_m));
       if (soles.verdict == CheckVerdict::kFailed) {
         soles.advice =

@@ -45,7 +45,8 @@ struct SelfCheck {
 ///   walk_to      A walk to a goal 3 m straight ahead arrives. If the library has no stop, the walk
 ///                ends within half a step of the goal.
 ///   knees        Knees bend forward: bent legs deviate at most 60 degrees from their feet.
-///   soles        Soles of standing feet are within 1 cm of the ground, and no sole is deeper.
+///   soles        Soles of standing feet are at most 1 cm above the ground, and the ball of a foot
+///                is never more than 1 cm below it.
 ///
 /// The same library always gives the same results. Takes some milliseconds to some tenths of a
 /// second. `library` must not be null.
