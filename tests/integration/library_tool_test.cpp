@@ -443,6 +443,13 @@ TEST_F(LibraryTool, ReportsMovementsTheLibraryDoesNotHave) {
       "c.json", R"({"movements":[{"jump":{"length_m":0.9}},{"step":{"length_m":0.5}}]})");
   ExpectFailure({"synthesize", Out(), "--choreography", choreography, "--out", Out("o.bvh")}, 2,
                 "c.json: movements[1].step: ");
+  const json report = ParseOutput(
+      Tool({"synthesize", Out(), "--choreography", choreography, "--out", Out("o.bvh"), "--json"})
+          .out);
+  EXPECT_THAT(report["error"].get<std::string>(), HasSubstr("movements[1].step: "));
+  ASSERT_EQ(report["refusals"].size(), 1u);
+  EXPECT_EQ(report["refusals"][0]["request"], 1);
+  EXPECT_THAT(report["refusals"][0]["reason"].get<std::string>(), HasSubstr("no such step"));
   EXPECT_FALSE(std::filesystem::exists(Out("o.bvh")));
 }
 
@@ -587,6 +594,30 @@ TEST_F(LibraryTool, BuildCanSkipTheSelfCheck) {
   const json report = ParseOutput(Tool(Join(arguments, {"--json"})).out);
   EXPECT_EQ(report["self_check"], nullptr);
   EXPECT_TRUE(report["summary"].is_object());
+}
+
+// A captured library does not have steps of every length. Whatever the planner chooses instead, a
+// step that lands far from its request is listed.
+TEST_F(LibraryTool, ShortStepsWithLongStridesAreListed) {
+  const std::string choreography =
+      folder_.Write("c.json",
+                    R"({"movements":[{"step":{"length_m":0.28}},{"step":{"length_m":0.28}},
+                       {"step":{"length_m":0.28}},{"step":{"length_m":1.2}}]})");
+  ASSERT_EQ(Tool({"build", "--out", Out(), kJumps}).exit_code, 0);
+  const ProgramResult result =
+      Tool({"synthesize", Out(), "--choreography", choreography, "--out", Out("o.bvh"), "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json output = ParseOutput(result.out);
+  std::vector<json> listed;
+  for (const json& refusal : output["refusals"]) listed.push_back(refusal["request"]);
+  int checked = 0;
+  for (const json& movement : output["movements"]) {
+    if (movement["request"].is_null() || !movement.contains("landing_error_m")) continue;
+    if (movement["landing_error_m"].get<double>() < 0.25) continue;
+    EXPECT_THAT(listed, Contains(movement["request"]));
+    ++checked;
+  }
+  EXPECT_GE(checked, 1);
 }
 
 TEST_F(LibraryTool, SynthesisListsRequestsThatWereNotMet) {

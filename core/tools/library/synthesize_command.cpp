@@ -1,4 +1,6 @@
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 
 #include "command_line.h"
 #include "commands.h"
@@ -50,6 +52,19 @@ Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
   return json;
 }
 
+// Returns the report of a choreography that the library cannot play. `error.where` contains the
+// movement, for example "c.json: movements[3].jump".
+Json FailureToJson(const Error& error) {
+  Json refusals = Json::array();
+  const std::size_t at = error.where.find("movements[");
+  if (error.code == ErrorCode::kUnsupported && at != std::string::npos) {
+    const auto request =
+        std::strtoull(error.where.c_str() + at + std::strlen("movements["), nullptr, 10);
+    refusals.push_back({{"request", request}, {"reason", error.text}});
+  }
+  return {{"error", Describe(error)}, {"refusals", std::move(refusals)}};
+}
+
 }  // namespace
 
 int RunSynthesize(const SynthesizeCommand& command) {
@@ -80,7 +95,7 @@ int RunSynthesize(const SynthesizeCommand& command) {
     if (!error.where.empty()) where += (error.index >= 0 ? "." : ": ") + error.where;
     error.where = std::move(where);
     error.index = -1;
-    if (command.json) std::printf("%s\n", Dump({{"error", Describe(error)}}).c_str());
+    if (command.json) std::printf("%s\n", Dump(FailureToJson(error)).c_str());
     return PrintInputError(error);
   }
   const std::vector<Refusal> refusals = FindRefusals(input, *synthesis);
