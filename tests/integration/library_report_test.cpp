@@ -105,6 +105,28 @@ TEST_F(LibraryReport, IsDeterministic) {
   const std::string page = ReadWhole(std::filesystem::path(out) / "index.html");
   EXPECT_TRUE(IsWellFormed(page, {"meta", "img"}));
   EXPECT_THAT(page, HasSubstr("a &amp; b.swl"));
+  // The page opens with the verdict and a table of contents whose links all exist.
+  const std::size_t verdict = page.find(output["self_check"]["verdict"].get<std::string>());
+  const std::size_t contents = page.find("<nav");
+  ASSERT_NE(contents, std::string::npos);
+  EXPECT_LT(verdict, contents);
+  EXPECT_LT(contents, page.find("<h2 id="));
+  int links = 0;
+  for (std::size_t at = contents; (at = page.find("href=\"#", at)) != std::string::npos; ++at) {
+    const std::string id = page.substr(at + 7, page.find('"', at + 7) - at - 7);
+    EXPECT_THAT(page, HasSubstr("<h2 id=\"" + id + "\">"));
+    ++links;
+  }
+  EXPECT_GE(links, 6);
+  for (const json& sentence : output["summary"]["sentences"]) {
+    EXPECT_THAT(page, HasSubstr(sentence.get<std::string>()));
+  }
+  for (const json& check : output["self_check"]["checks"]) {
+    EXPECT_THAT(page, HasSubstr(check["title"].get<std::string>()));
+  }
+  for (const char* term : {"Pseudoexample", "Condition", "Generic time", "Hull"}) {
+    EXPECT_THAT(page, HasSubstr(std::string("<dt>") + term + "</dt>"));
+  }
   EXPECT_THAT(page, Not(HasSubstr("http")));  // The page is self-contained.
   std::size_t pictures = 0;
   for (std::size_t at = 0; (at = page.find("<img ", at)) != std::string::npos; ++at) ++pictures;

@@ -7,12 +7,14 @@
 #include "commands.h"
 #include "library_json.h"
 #include "offline/extract/assemble.h"
+#include "offline/inspect/inspect_json.h"
 #include "progress.h"
 #include "refinement_json.h"
 #include "report/report.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
+#include "summary_text.h"
 
 namespace stridewire {
 namespace {
@@ -24,6 +26,8 @@ constexpr const char* kInterrupted = "interrupted; no file written";
 Json ReportToJson(const Report& report, const ReportCommand& command) {
   Json json;
   json["library"] = command.library;
+  json["summary"] = SummaryToJson(report.summary);
+  json["self_check"] = SelfCheckToJson(report.self_check);
   json["max_error_m"] = command.max_error_m;
   json["groups"] = Json::array();
   for (std::size_t g = 0; g < report.plain.size(); ++g) {
@@ -150,6 +154,8 @@ int RunReport(const ReportCommand& command) {
     std::printf("%s\n", Dump(json).c_str());
   } else {
     std::printf("%s: index.html and %zu pictures\n", command.out.c_str(), report->pictures.size());
+    PrintSummary(report->summary);
+    PrintSelfCheck(report->self_check);
   }
   return kExitSuccess;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "offline/inspect/inspect_json.h"
 #include "runtime/library/convex_hull.h"
 #include "runtime/movement/movement.h"
 #include "runtime/plan/request_plan.h"
@@ -230,6 +231,11 @@ HttpAnswer SkeletonPage(const MotionLibrary& library) {
                      {"legs", legs}});
 }
 
+HttpAnswer SummaryPage(const std::shared_ptr<const MotionLibrary>& library) {
+  return JsonAnswer({{"summary", SummaryToJson(Summarize(*library))},
+                     {"self_check", SelfCheckToJson(CheckLibrary(library))}});
+}
+
 HttpAnswer SitesPage(const MotionGroup& group) {
   Json parameters = Json::array();
   for (const Parameter& parameter : group.parameters) {
@@ -377,6 +383,7 @@ std::optional<HttpAnswer> LibraryPages::Answer(const HttpQuery& query) const {
   const MotionLibrary& library = *entry->second.library;
   rest.remove_prefix(std::min(rest.size(), hash.size() + 1));
   if (rest == "skeleton.json") return SkeletonPage(library);
+  if (rest == "summary.json") return SummaryPage(entry->second.library);
   const std::string_view number = rest.substr(0, rest.find('/'));
   rest.remove_prefix(std::min(rest.size(), number.size() + 1));
   int group = -1;

@@ -15,6 +15,8 @@ namespace stridewire::server {
 ///
 ///   /libraries.json                             name, hash and groups of each library
 ///   /libraries/HASH/skeleton.json               joints, end sites, legs
+///   /libraries/HASH/summary.json                what avatars can do with the library, and whether
+///                                               it passes its self-check
 ///   /libraries/HASH/GROUP/sites.json            parameters, examples and pseudoexamples
 ///   /libraries/HASH/GROUP/step.json?p=A,B,...   the movement with these parameters, which are
 ///                                               clamped as in requests. With &correction=0 its

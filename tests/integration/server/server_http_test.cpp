@@ -262,6 +262,17 @@ TEST_F(ServerLibraries, DescribeTheirGroups) {
   }
 }
 
+TEST_F(ServerLibraries, SaysWhatALibraryCanDo) {
+  const nlohmann::json answer = Get(folder + "/summary.json");
+  const nlohmann::json& summary = answer["summary"];
+  EXPECT_GT(summary["strides"]["left"]["length_m"]["max"].get<double>(), 0.1);
+  EXPECT_FALSE(summary["sentences"].empty());
+  for (const nlohmann::json& missing : summary["missing"]) {
+    EXPECT_FALSE(missing["advice"].get<std::string>().empty());
+  }
+  EXPECT_EQ(answer["self_check"]["checks"].size(), 5u);
+}
+
 TEST_F(ServerLibraries, SynthesizeRequestedMovements) {
   const std::size_t joints = Get(folder + "/skeleton.json")["names"].size();
   const nlohmann::json step = Get(folder + "/0/step.json?p=-0.31,0.62");

@@ -72,6 +72,26 @@ export interface ErrorMap {
   readonly largest_m: number;
 }
 
+/** What avatars can do with a library. */
+export interface Summary {
+  readonly summary: {
+    /** One sentence per sort of movement. */
+    readonly sentences: readonly string[];
+    readonly missing: readonly {readonly what: string; readonly advice: string}[];
+  };
+  readonly self_check: {
+    readonly passed: boolean;
+    /** The whole result in one sentence. */
+    readonly verdict: string;
+    readonly checks: readonly {
+      readonly title: string;
+      readonly verdict: 'passed' | 'failed' | 'not_applicable';
+      readonly text: string;
+      readonly advice: string | null;
+    }[];
+  };
+}
+
 interface SkeletonJson {
   readonly names: readonly string[];
   readonly parents: readonly number[];
@@ -106,6 +126,10 @@ export class LibraryClient {
       endSites: it.end_sites.map(({joint, offset_m}) => ({joint, offsetM: offset_m})),
       leftLeg: left!, rightLeg: right!,
     };
+  }
+
+  summary(hash: string): Promise<Summary> {
+    return this.get(`/libraries/${hash}/summary.json`);
   }
 
   group(hash: string, group: number): Promise<Group> {

@@ -7,7 +7,9 @@ import {applyTheme, makeColours, preferredTheme, rememberTheme} from '../theme.j
 import type {ThemeName} from '../theme.js';
 import {genericTime} from '../timeline.js';
 import {LatestRequest} from './library_client.js';
-import type {Clip, Group, GroupEntry, LibraryEntry, LibraryClient, Step} from './library_client.js';
+import type {
+  Clip, Group, GroupEntry, LibraryClient, LibraryEntry, Step, Summary,
+} from './library_client.js';
 import {ParameterPlane, parameterLabel, scaleColour} from './parameter_plane.js';
 import {StepPreview} from './step_preview.js';
 
@@ -67,6 +69,8 @@ export class LibraryPage {
   private readonly legend = h('canvas',
     {class: 'legend', 'aria-hidden': 'true', width: 128, height: 1});
   private readonly legendText = h('span', {class: 'hint'});
+  /** What the library can do; folded so that it leaves room for the parameters. */
+  private readonly summaryArea = h('details', {class: 'library-summary', id: 'summary'});
   private readonly message = h('div', {class: 'notice', role: 'alert'});
   private readonly scrub = h('input', {
     type: 'range', id: 'time', min: 0, max: 1, step: 0.001, value: 0, 'aria-label': 'Time'});
@@ -111,6 +115,7 @@ export class LibraryPage {
         h('a', {class: 'link', href: `/${location.search}`}, 'Worlds'), theme),
       h('div', {class: 'library-layout'},
         h('section', {class: 'parameter-area', 'aria-label': 'Parameters'},
+          this.summaryArea,
           h('div', {class: 'axes'}, '→', this.xSelect, '↑', this.ySelect),
           this.plane.element,
           h('div', {class: 'row'}, this.mapSelect, this.legend, this.legendText),
@@ -174,6 +179,7 @@ export class LibraryPage {
       this.preview.setSkeleton(skeleton);
       this.groupSelect.replaceChildren(...library.groups.map((group, i) =>
         h('option', {value: i}, groupLabel(group))));
+      void this.fetchSummary(library);
       await this.openGroup(0);
     } catch (error) {
       this.showMessage((error as Error).message);
@@ -285,6 +291,16 @@ export class LibraryPage {
     this.showValues(step);
   }
 
+  private async fetchSummary(library: LibraryEntry): Promise<void> {
+    this.summaryArea.replaceChildren(h('summary', {}, 'Checking the library…'));
+    try {
+      const summary = await this.client.summary(library.hash);
+      if (this.library === library) this.summaryArea.replaceChildren(...summaryNodes(summary));
+    } catch (error) {
+      if (this.library === library) this.showMessage((error as Error).message);
+    }
+  }
+
   private async fetchMap(request: ErrorMapRequest): Promise<void> {
     const map = await this.client.errors(
       request.hash, request.group, request.x, request.y, request.p, mapCells, request.corrected);
@@ -372,6 +388,24 @@ export class LibraryPage {
         `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -100%)`;
     });
   }
+}
+
+/** Describes what a library can do, what is missing and the results of its self-check. */
+export function summaryNodes({summary, self_check: check}: Summary): HTMLElement[] {
+  const list = (items: readonly string[]): HTMLElement =>
+    h('ul', {}, ...items.map((item) => h('li', {}, item)));
+  const nodes = [
+    h('summary', {class: check.passed ? 'passed' : 'failed'},
+      `What this library can do · ${check.verdict}`),
+    list(summary.sentences),
+  ];
+  if (summary.missing.length > 0) {
+    nodes.push(h('h2', {}, 'What is missing'),
+      list(summary.missing.map(({what, advice}) => `${what}: ${advice}`)));
+  }
+  nodes.push(h('h2', {}, 'Self-check'), list(check.checks.map(({title, verdict, text, advice}) =>
+    `${title} (${verdict.replace('_', ' ')}): ${text}${advice === null ? '' : ` ${advice}`}`)));
+  return nodes;
 }
 
 /**

@@ -44,6 +44,18 @@ const positionOf = (p) => page.evaluate((values) => {
   return {x: box.left + at.x, y: box.top + at.y};
 }, p);
 
+test('says what the library can do and whether it passes its self-check', async () => {
+  const area = page.locator('#summary');
+  await waitFor('the summary has been received', async () =>
+    (await area.locator('summary').textContent()).includes('Self-check'));
+  await area.locator('summary').click();
+  const text = await area.textContent();
+  for (const part of ['Starts', 'Turns to the left', 'Jumps', 'Walk to a goal 3 m ahead']) {
+    assert.ok(text.includes(part), part);
+  }
+  await area.locator('summary').click();
+});
+
 test('dragging the cross changes the step immediately', async () => {
   const before = await requested();
   const from = await positionOf(before);

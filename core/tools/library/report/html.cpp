@@ -15,16 +15,25 @@ bool IsNumber(const std::string& text) {
 }
 
 constexpr std::string_view kStyle = R"(
-body { font: 16px/1.5 sans-serif; color: #1a1a1a; background: #fff; max-width: 1240px;
+body { font: 16px/1.5 sans-serif; color: #1a1a1a; background: #fff; max-width: 1200px;
        margin: 2em auto; padding: 0 1em; }
 h2 { margin-top: 2.2em; border-bottom: 1px solid #bbb; }
-figure { margin: 1.2em 0; overflow-x: auto; }
+figure { margin: 1.2em 0; }
 figcaption { color: #333; max-width: 60em; }
+p, ul, dl { max-width: 60em; }
 img { max-width: 100%; height: auto; }
-table { border-collapse: collapse; margin: 1em 0; display: block; overflow-x: auto; }
-th, td { border: 1px solid #bbb; padding: 0.2em 0.6em; text-align: left; }
+table { border-collapse: collapse; margin: 1em 0; display: block; max-width: 100%;
+        overflow-x: auto; font-size: 0.9em; }
+th, td { border: 1px solid #bbb; padding: 0.2em 0.5em; text-align: left; vertical-align: top; }
 th { background: #eee; }
 td.n { text-align: right; font-variant-numeric: tabular-nums; }
+dt { font-weight: bold; }
+dd { margin: 0 0 0.6em 1.5em; }
+.verdict { border-left: 6px solid #2e7d32; background: #eef6ee; padding: 0.2em 1em; }
+.verdict.failed { border-color: #b71c1c; background: #fbeeee; }
+nav { background: #f5f5f5; padding: 0.2em 1em; margin: 1em 0; }
+nav h2 { margin: 0.4em 0; border: 0; font-size: 1.1em; }
+nav ul { columns: 3; padding-left: 1.2em; max-width: none; }
 )";
 
 }  // namespace

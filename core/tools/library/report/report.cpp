@@ -6,6 +6,7 @@
 #include "gnuplot.h"
 #include "html.h"
 #include "offline/base/text.h"
+#include "overview.h"
 
 namespace stridewire {
 namespace {
@@ -25,12 +26,13 @@ std::string ParameterList(const MotionGroup& group) {
   return text;
 }
 
-std::string GroupTable(const Report& report) {
+// Lists the groups, and the errors of their movements.
+std::string GroupTables(const Report& report) {
   HtmlTable rows = {{"Group", "Kind", "Examples", "Parameters"}};
-  HtmlTable errors = {{"Group", "Kind", "Examples", "Pseudoexamples", "Before, max mm",
-                       "Before, mean mm", "Refined, max mm", "Refined, mean mm",
-                       "At pseudoexamples, mm", "Corrected, max mm", "Iterations", "Sum |w|",
-                       "Condition"}};
+  HtmlTable errors = {{"Group", "Kind", "Uncorrected, mm", "Mean, mm", "Corrected, mm",
+                       "Iterations", "Sum |w|", "Condition"}};
+  HtmlTable refined_errors = {
+      {"Group", "Kind", "Pseudoexamples", "Largest error, mm", "Mean, mm", "At them, mm"}};
   const auto groups = report.refinement.library->groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const MotionGroup& group = groups[g];
@@ -39,26 +41,31 @@ std::string GroupTable(const Report& report) {
     const std::string kind(MovementKindName(group.kind));
     rows.push_back(
         {std::to_string(g), kind, std::to_string(group.example_count), ParameterList(group)});
-    errors.push_back(
-        {std::to_string(g), kind, std::to_string(group.example_count),
-         std::to_string(group.site_count - group.example_count), Mm(refined.before.max_error_m),
-         Mm(refined.before.mean_error_m), Mm(refined.after.max_error_m),
-         Mm(refined.after.mean_error_m), Text("%.5f", 1000.0 * refined.pseudoexample_error_m),
-         Text("%.4f", 1000.0 * plain.corrected_max_m), std::to_string(plain.iterations),
-         Text("%.2f", refined.after.weight_sum_max), Text("%.1f", refined.after.condition)});
+    errors.push_back({std::to_string(g), kind, Mm(refined.before.max_error_m),
+                      Mm(refined.before.mean_error_m), Text("%.4f", 1000.0 * plain.corrected_max_m),
+                      std::to_string(plain.iterations), Text("%.2f", refined.after.weight_sum_max),
+                      Text("%.1f", refined.after.condition)});
+    refined_errors.push_back({std::to_string(g), kind,
+                              std::to_string(group.site_count - group.example_count),
+                              Mm(refined.after.max_error_m), Mm(refined.after.mean_error_m),
+                              Text("%.5f", 1000.0 * refined.pseudoexample_error_m)});
   }
   return TableHtml(rows) +
-         "<p>Error of synthesized movements over the hull of the examples; a radian counts as "
-         "0.5 m. Corrected: error without pseudoexamples after the run-time correction of the "
-         "weights, "
-         "and the largest number of iterations it takes.</p>\n" +
-         TableHtml(errors);
+         "<h3>Errors of movements</h3>\n<p>How far the parameters of synthesized movements are "
+         "from "
+         "those asked for, over the hull of the examples. Avatars play corrected movements; the "
+         "last columns say how many iterations that takes and how extreme the weights "
+         "become.</p>\n" +
+         TableHtml(errors) +
+         "<h3>Errors after refinement</h3>\n<p>The same without correction, after refinement has "
+         "added pseudoexamples as in the paper.</p>\n" +
+         TableHtml(refined_errors);
 }
 
 std::string Cm(double m) { return Text("%.2f", 100.0 * m); }
 
 // Compares synthesized with captured movements.
-std::string RealismHtml(const MotionLibrary& captured, const std::vector<LeaveOneOut>& realism) {
+Section RealismSection(const MotionLibrary& captured, const std::vector<LeaveOneOut>& realism) {
   HtmlTable rows = {{"Group", "Parameters", "Movements", "Method", "Joints, cm", "Trunk", "Head",
                      "Arms", "Legs", "Foot, cm", "Keytimes, ms", "Parameters, cm",
                      "Cardinal is nearer"}};
@@ -85,12 +92,13 @@ std::string RealismHtml(const MotionLibrary& captured, const std::vector<LeaveOn
       rows.push_back(std::move(row));
     }
   }
-  return "<h2>Realism</h2>\n<p>Leave-one-out test: each captured movement is synthesized from all "
-         "others with its own parameters and compared with the capture by the mean distance of "
-         "joints at equal generic times. Parameters outside the hull of the others are moved to "
-         "its edge. The other methods are the nearest captured movement without changes, and the "
-         "nearest d + 1 blended by inverse distance, as in blend spaces.</p>\n" +
-         TableHtml(rows);
+  return {"realism", "Realism",
+          "<p>Leave-one-out test: each captured movement is synthesized from all "
+          "others with its own parameters and compared with the capture by the mean distance of "
+          "joints at equal generic times. Parameters outside the hull of the others are moved to "
+          "its edge. The other methods are the nearest captured movement without changes, and the "
+          "nearest d + 1 blended by inverse distance, as in blend spaces.</p>\n" +
+              TableHtml(rows)};
 }
 
 bool IsMirrored(const MotionGroup& group) {
@@ -109,8 +117,9 @@ bool IsMap(const ErrorMap& map) {
   return spans(map.x) && spans(map.y) && inside > 8;
 }
 
-// A section of the page: a heading, a sentence and figures.
+// A section with figures that are not drawn yet.
 struct Part {
+  std::string id;
   std::string heading;
   std::string text;
   std::vector<Figure> figures;
@@ -179,7 +188,8 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
     }
     report.plain.push_back(MeasureInterpolationError(*plain->library, g));
     const MotionGroup& group = library->group(g);
-    Part part{"Group " + std::to_string(g) + ": " + std::string(MovementKindName(group.kind)),
+    Part part{"group-" + std::to_string(g),
+              "Group " + std::to_string(g) + ": " + std::string(MovementKindName(group.kind)),
               std::to_string(group.example_count) + " examples; " + ParameterList(group) + ".",
               {}};
     if (group.kind == MovementKind::kStepRight && IsMirrored(group)) {
@@ -207,8 +217,10 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
     }
     parts.push_back(std::move(part));
   }
-  Part walks{
-      "Walks", "Synthesized from the library with run-time correction and planted feet.", {}};
+  Part walks{"walks",
+             "Walks",
+             "Synthesized from the library with run-time correction and planted feet.",
+             {}};
   for (const Walk& walk : DemonstrationWalks(*library)) {
     auto figure = WalkFigure(library, walk.name, walk.caption, walk.requests);
     if (!figure) return std::unexpected(figure.error());
@@ -216,19 +228,25 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
   }
   if (!walks.figures.empty()) parts.insert(parts.begin(), std::move(walks));
 
-  std::string body = "<p>" + std::to_string(library->skeleton().joint_count()) + " joints, " +
-                     std::to_string(library->bytes().size()) + " bytes, hash " +
-                     EscapeHtml(library->hash()) + ".</p>\n" + GroupTable(report);
+  report.summary = Summarize(*library);
+  report.self_check = CheckLibrary(library);
+  std::vector<Section> sections = {
+      SummarySection(report.summary),
+      SelfCheckSection(report.self_check),
+      {"groups", "Groups of examples",
+       "<p>" + std::to_string(library->skeleton().joint_count()) + " joints, " +
+           std::to_string(library->bytes().size()) + " bytes, hash " + EscapeHtml(library->hash()) +
+           ".</p>\n" + GroupTables(report)}};
   if (options.captured != nullptr) {
     for (int g = 0; g < static_cast<int>(options.captured->groups().size()); ++g) {
       report.realism.push_back(MeasureLeaveOneOut(*options.captured, g));
     }
-    body += RealismHtml(*options.captured, report.realism);
+    sections.push_back(RealismSection(*options.captured, report.realism));
   }
   std::size_t count = 0;
   for (const Part& part : parts) count += part.figures.size();
   for (const Part& part : parts) {
-    body += "<h2>" + EscapeHtml(part.heading) + "</h2>\n<p>" + EscapeHtml(part.text) + "</p>\n";
+    Section section{part.id, part.heading, "<p>" + EscapeHtml(part.text) + "</p>\n"};
     for (const Figure& figure : part.figures) {
       const double drawn = static_cast<double>(report.pictures.size()) / static_cast<double>(count);
       if (!report_progress(kPlanned + (1.0 - kPlanned) * drawn)) {
@@ -240,10 +258,14 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
         error.where = figure.file + ": " + error.where;
         return std::unexpected(error);
       }
-      body += PictureHtml(*svg, figure.caption, figure.file);
+      section.html += PictureHtml(*svg, figure.caption, figure.file);
       report.pictures.push_back({figure.file, *std::move(svg)});
     }
+    sections.push_back(std::move(section));
   }
+  sections.push_back(TermsSection());
+  std::string body = VerdictHtml(report.self_check, report.summary) + ContentsHtml(sections);
+  for (const Section& section : sections) body += SectionHtml(section);
   report.html = PageHtml("Stridewire library report: " + options.name, body);
   return report;
 }

@@ -9,6 +9,8 @@
 #include "offline/build/interpolation_error.h"
 #include "offline/build/leave_one_out.h"
 #include "offline/build/refine.h"
+#include "offline/inspect/library_summary.h"
+#include "offline/inspect/self_check.h"
 #include "stridewire/base/error.h"
 
 namespace stridewire {
@@ -33,6 +35,8 @@ struct ReportPicture {
 struct Report {
   std::string html;
   std::vector<ReportPicture> pictures;
+  LibrarySummary summary;
+  SelfCheck self_check;
   Refinement refinement;                  // Result of refinement with the amended rule.
   std::vector<InterpolationError> plain;  // [group]: errors without pseudoexamples.
   // [group of ReportOptions::captured]: differences between synthesized and captured movements.
