@@ -231,9 +231,10 @@ TEST(SwitchPlantingOnHills, MovesFeetSmoothlyOntoTheGround) {
   ASSERT_GT(landings, 20 * kRandomWalkers);
   EXPECT_LE(worst_m, 0.05);  // Soles rest on the highest point of the ground below them.
   // The cubic that fades out a height over T starts with an acceleration of 6 / T^2 times the
-  // height.
+  // height. On a slope, the planned movement lowers the root as well, by less than kSinkM.
+  constexpr double kSinkM = 0.1;
   ExpectNoJumps(figures, LargestStepOfExamples(*library, kFps),
-                6.0 * deepest_m / (kEaseOutS * kEaseOutS) * kTickS);
+                6.0 * (deepest_m + kSinkM) / (kEaseOutS * kEaseOutS) * kTickS);
 }
 
 TEST(SwitchPlantingOff, RejectsNewAndQueuedExactPlacements) {

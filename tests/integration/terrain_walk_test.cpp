@@ -20,6 +20,8 @@ constexpr double kFps = 60.0;
 
 // Largest depth below the ground, smallest clearance above it, and largest drift.
 constexpr double kDeepestM = 0.002;
+// People climbing blocks of 40 cm bend their knees by up to 125 degrees.
+constexpr double kLargestKneeDeg = 130.0;
 constexpr double kMostDriftM = 0.001;
 constexpr double kLeastClearanceM = 0.01;
 // A foot is over an edge if the ground below its heel or toes is this much below the ground at its
@@ -140,6 +142,7 @@ struct Looks {
   double drift_m = 0.0;
   double off_ground_m = 0.0;  // Height of a standing foot's ball above where it should be.
   double least_knee_deg = 180.0;
+  double largest_knee_deg = 0.0;
   int over_edges = 0;  // Standing feet whose heel or toes are over an edge.
   double travelled_m = 0.0;
 };
@@ -184,6 +187,7 @@ Looks LookAt(const char* name, const Library& library, const Course& course) {
     legs.Set(clip.frame(static_cast<int>(f)));
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       looks.least_knee_deg = std::min(looks.least_knee_deg, legs.KneeDegrees(foot));
+      looks.largest_knee_deg = std::max(looks.largest_knee_deg, legs.KneeDegrees(foot));
       const auto sole = legs.Sole(foot);
       const auto& rest = legs.RestingHeights(foot);
       const auto& planted = stands[static_cast<int>(foot)];
@@ -207,10 +211,11 @@ Looks LookAt(const char* name, const Library& library, const Course& course) {
   looks.travelled_m = clip.root_positions_m.back().z;
   std::printf(
       "%-26s %5.1f m: %.1f mm into the ground, standing %.1f mm, balls stand up to %.1f mm high, "
-      "pass at least %.1f mm above it, drift %.3f mm, knees from %.1f deg, %d over an edge\n",
+      "pass at least %.1f mm above it, drift %.3f mm, knees from %.1f to %.1f deg, "
+      "%d over an edge\n",
       name, looks.travelled_m, 1e3 * looks.deepest_m, 1e3 * looks.standing_m,
       1e3 * looks.off_ground_m, 1e3 * looks.least_clearance_m, 1e3 * looks.drift_m,
-      looks.least_knee_deg, looks.over_edges);
+      looks.least_knee_deg, looks.largest_knee_deg, looks.over_edges);
   return looks;
 }
 
@@ -219,6 +224,7 @@ void ExpectGoodLooks(const Looks& looks) {
   EXPECT_GE(looks.least_clearance_m, kLeastClearanceM);
   EXPECT_LE(looks.drift_m, kMostDriftM);
   EXPECT_GE(looks.least_knee_deg, 0.0);
+  EXPECT_LE(looks.largest_knee_deg, kLargestKneeDeg);
   EXPECT_EQ(looks.over_edges, 0);
 }
 

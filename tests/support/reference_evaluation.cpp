@@ -231,6 +231,8 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
                              ? 1.0 - EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s)
                              : 1.0;
   // The root moves with the corrections of the feet, and with what lifts them out of the ground.
+  // The shares of the feet in the latter change gradually.
+  const double entering = EaseOut((time_s - movement.start_offset_s) / movement.ease_out_s);
   DVec3 shift = CorrectFeet(skeleton, rig, movement, time_s, pose).root_m;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     Side& side = sides[static_cast<std::size_t>(foot)];
@@ -243,7 +245,8 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
           settled * LiftOutOfGround(plan.foot(foot), time_s, rig.side(foot), side.leg,
                                     blended.ball_m + side.correction.offset_m, side.turn);
       side.correction.offset_m.y += lift_m;
-      shift.y += side.correction.root_weight * lift_m;
+      const double weight = side.correction.root_weight;
+      shift.y += (weight + entering * (1.0 - 2.0 * weight)) * lift_m;
     }
     const Vec3 ankle = side.leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)];
     side.ankle_m =

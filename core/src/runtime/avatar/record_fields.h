@@ -77,14 +77,12 @@ void DecisionFields(Stream& stream, unsigned flags, MovementKind kind, L& decisi
   stream.F64(decision.turn_rad);
   stream.F64(decision.height_m);
   if ((flags & kOnTerrain) != 0) {
-    stream.F64(decision.lift_m);
+    for (auto& lift : decision.lift_m) stream.F64(lift);
     Vector(stream, decision.normal);
     stream.CheckUnit(decision.normal);
   }
   if ((flags & kAside) != 0) stream.F64(decision.aside_m.x), stream.F64(decision.aside_m.z);
-  if ((flags & kRootShift) != 0) {
-    stream.F64(decision.root_shift_m.x), stream.F64(decision.root_shift_m.z);
-  }
+  if ((flags & kRootShift) != 0) Vector(stream, decision.root_shift_m);
 }
 
 template <typename Stream, typename C>
@@ -131,7 +129,7 @@ void PlanFields(Stream& stream, P& plan) {
       Vector(stream, normal);
       stream.CheckUnit(normal);
     }
-    stream.F64(trajectory.lift_m);
+    for (auto& lift : trajectory.lift_m) stream.F64(lift);
     Vector(stream, trajectory.aside_m);
     Vector(stream, trajectory.root_shift_m);
     auto& residual = plan.residuals[f];

@@ -36,7 +36,9 @@ struct FootTrajectory {
   std::array<double, 3> turn_rad{};
   /// Ground normals at `from` and `to`.
   std::array<Vec3, 2> normals{Vec3(0.0f, 1.0f, 0.0f), Vec3(0.0f, 1.0f, 0.0f)};
-  double lift_m = 0.0;  ///< Additional height in the middle of the swing, to clear the ground.
+  /// Additional heights early, in the middle and late in the swing, to clear the ground. Each is
+  /// the peak of a curve that fades in and out (LiftShare).
+  std::array<double, 3> lift_m{};
   /// Sideways offset in the middle of the swing, to pass the other foot.
   DVec3 aside_m = DVec3(0.0);
   /// Share of the foot's correction by which the root moves; the shares of both feet sum to 1.

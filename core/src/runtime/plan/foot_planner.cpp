@@ -9,6 +9,7 @@
 #include "runtime/plan/foot_sampler.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
@@ -30,11 +31,15 @@ constexpr double kBumpM = 0.05;
 constexpr double kClearanceM = 0.037;
 constexpr double kMaxLiftM = 0.4;
 constexpr double kPassingRadiusM = 0.02;
-// Fractions of the swing at which clearance is checked. Closer to its footprints, LiftOutOfGround
-// keeps the foot above their ground.
-constexpr std::array<double, 15> kClearanceSamples{0.13,   0.1825, 0.235,  0.2875, 0.34,
-                                                   0.3925, 0.445,  0.4975, 0.55,   0.6025,
-                                                   0.655,  0.7075, 0.76,   0.8125, 0.865};
+// Fractions of the swing at which clearance is checked, closest together where the foot passes the
+// edges of treads. Closer to its footprints, LiftOutOfGround keeps the foot above their ground.
+constexpr std::array<double, 20> kClearanceSamples{0.09, 0.13, 0.16, 0.19, 0.22, 0.25, 0.28,
+                                                   0.32, 0.37, 0.43, 0.49, 0.55, 0.61, 0.66,
+                                                   0.71, 0.76, 0.8,  0.84, 0.88, 0.91};
+
+// Fractions of the swing at which the reach of the legs is checked.
+constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
+constexpr double kMaxRootSinkM = 0.3;
 
 // Largest sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
@@ -70,6 +75,34 @@ double ValueOr(const MotionGroup& group, const ParameterValues& values, Paramete
                double otherwise) {
   const int l = group.FindParameter(name);
   return l < 0 ? otherwise : values.values[static_cast<std::size_t>(l)];
+}
+
+constexpr std::size_t kMiddleLift = 1;
+
+// Returns lifts whose sum is at least `lacks_m` at each sample of the swing, as far as kMaxLiftM
+// allows. The greatest lack is met first, by the lift that has the largest share at that moment.
+std::array<double, 3> LiftsFor(std::array<double, kClearanceSamples.size()> lacks_m) {
+  constexpr double kNegligibleM = 1e-4;
+  std::array<double, 3> lifts_m{};
+  for (std::size_t round = 0; round < kClearanceSamples.size(); ++round) {
+    const auto worst =
+        static_cast<std::size_t>(std::ranges::max_element(lacks_m) - lacks_m.begin());
+    if (lacks_m[worst] < kNegligibleM) break;
+    std::size_t best = kMiddleLift;
+    for (const std::size_t lift : {0, 2}) {
+      if (LiftShare(lift, kClearanceSamples[worst]) > LiftShare(best, kClearanceSamples[worst])) {
+        best = lift;
+      }
+    }
+    const double before_m = lifts_m[best];
+    const double share = LiftShare(best, kClearanceSamples[worst]);
+    lifts_m[best] = std::min(before_m + lacks_m[worst] / share, kMaxLiftM);
+    for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
+      lacks_m[i] -= (lifts_m[best] - before_m) * LiftShare(best, kClearanceSamples[i]);
+    }
+    if (lifts_m[best] >= kMaxLiftM) lacks_m[worst] = 0.0;
+  }
+  return lifts_m;
 }
 
 class Planner {
@@ -277,20 +310,65 @@ class Planner {
     return shift * std::min(1.0, kMaxRootShiftM / std::max(length_m, kMaxRootShiftM));
   }
 
+  // Returns by how much the root has to be lower at the end of the movement, so that both legs
+  // reach their footprints. The root then descends during the whole movement. Without this,
+  // planting would lower it abruptly just before the foot lands on a lower tread.
+  double RootSink(Foot moving) {
+    const FootTrajectory& trajectory = movement_.feet.foot(moving);
+    double sink_m = 0.0;
+    for (const double part : kSinkSamples) {
+      const double time_s =
+          trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
+      const double share = 1.0 - EaseOut(time_s / movement_.duration_s());
+      sink_m = std::max(sink_m, MissingReach(time_s) / share);
+    }
+    return std::min(sink_m, kMaxRootSinkM);
+  }
+
+  // Returns by how much planting would lower the root at this time, so that both legs reach their
+  // targets.
+  double MissingReach(double time_s) {
+    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
+    std::array<LegPose, 2> legs;
+    FeetAt blended;
+    for (std::size_t f = 0; f < 2; ++f) {
+      EvaluateLeg(skeleton_, rig_, pose_, static_cast<Foot>(f), legs[f]);
+      blended[f] = FootOf(rig_, static_cast<Foot>(f), DVec3(pose_.root_position_m), legs[f]);
+    }
+    const FeetCorrection corrections = CorrectFeet(movement_, time_s, blended);
+    double missing_m = 0.0;
+    for (std::size_t f = 0; f < 2; ++f) {
+      const LegRig::Side& side = rig_.sides[f];
+      const Vec3& hip = legs[f].positions_m[static_cast<std::size_t>(side.hip)];
+      const Vec3& ankle = legs[f].positions_m[static_cast<std::size_t>(side.ankle)];
+      const double length_m = static_cast<double>(side.thigh_m) + side.shank_m;
+      const double allowed_m = std::clamp(static_cast<double>(glm::length(ankle - hip)),
+                                          kEasyExtension * length_m, kLongestExtension * length_m);
+      const DVec3 at = blended[f].ball_m + corrections.feet[f].offset_m +
+                       DVec3(TurnOf(corrections.feet[f]) * (ankle - legs[f].ball_m));
+      const DVec3 reach = at - (DVec3(pose_.root_position_m) + corrections.root_m + DVec3(hip));
+      const double drop_squared = allowed_m * allowed_m - reach.x * reach.x - reach.z * reach.z;
+      const double drop_m = std::sqrt(std::max(drop_squared, 0.25 * length_m * length_m));
+      missing_m = std::max(missing_m, -reach.y - drop_m);
+    }
+    return missing_m;
+  }
+
   void StandOnGround(Foot foot, const Terrain& terrain, FootTrajectory& trajectory) const {
     const FootSupport support = SupportOf(terrain, rig_.side(foot), trajectory.to);
     trajectory.to.position_m.y = StandingHeight(support);
     trajectory.normals[1] = support.normal;
   }
 
-  // Returns the lift that the swinging foot needs at the middle of its swing, so that its sole
-  // clears the ground.
-  double LiftOver(Foot moving, const Terrain& terrain) {
+  // Returns the lifts (FootTrajectory::lift_m) that the swinging foot needs so that its sole clears
+  // the ground.
+  std::array<double, 3> LiftOver(Foot moving, const Terrain& terrain) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const LegRig::Side& side = rig_.side(moving);
     LegPose leg;
-    double lift_m = 0.0;
-    for (const double part : kClearanceSamples) {
+    std::array<double, kClearanceSamples.size()> lacks_m{};
+    for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
+      const double part = kClearanceSamples[i];
       const double time_s =
           trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
       EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
@@ -299,17 +377,19 @@ class Planner {
       const FootCorrection correction = CorrectFoot(movement_, moving, time_s, blended);
       const DVec3 ball = blended.ball_m + correction.offset_m;
       const Quat turn = TurnOf(correction);
-      const double lift = LiftShare(part);
+      // Near its footprints, a foot may be close to a riser without touching it.
+      const double away = LiftShare(kMiddleLift, part);
       const auto clear = [&](const Vec3& point, double rest_m) {
         const DVec3 at = ball + DVec3(turn * (point - leg.ball_m));
-        const double ground_m = terrain.HighestWithin(at.x, at.z, kPassingRadiusM);
-        lift_m = std::max(lift_m, (ground_m + kClearanceM * lift - (at.y - rest_m)) / lift);
+        const double radius_m = kPassingRadiusM * (0.25 + 0.75 * away);
+        const double ground_m = terrain.HighestWithin(at.x, at.z, radius_m);
+        lacks_m[i] = std::max(lacks_m[i], ground_m + kClearanceM * away - (at.y - rest_m));
       };
       clear(leg.ball_m, side.ball_height_m);
       clear(leg.heel_m, side.ball_height_m);
       clear(leg.toe_tip_m, side.toe_height_m);
     }
-    return std::min(lift_m, kMaxLiftM);
+    return LiftsFor(lacks_m);
   }
 
  private:
@@ -484,13 +564,16 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
       return planner.Entry();
     }
     const double push_m = planner.PushAside(moving);
+    double root_sink_m = 0.0;
     if (target->terrain != nullptr) trajectory.lift_m = planner.LiftOver(moving, *target->terrain);
+    if (target->terrain != nullptr) root_sink_m = planner.RootSink(moving);
     if (push_m > 0.0) {
       trajectory.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
                                      DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
     }
     if (target->request.root_m)
       trajectory.root_shift_m = planner.RootShift(*target->request.root_m);
+    trajectory.root_shift_m.y = -root_sink_m;
     return planner.Entry();
   }
 

@@ -8,6 +8,7 @@
 #include "runtime/library/locomotion_profile.h"
 #include "runtime/plan/foot_planner.h"
 #include "runtime/plan/walk_steering.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
@@ -37,6 +38,12 @@ constexpr double kHurdleRadiusM = 0.06;
 
 // Radii of the rings of eight alternative footprints around the desired one, closest first.
 constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
+
+// Feet keep this distance from risers in front of their toes and behind their heels, if a shift of
+// the footprint makes that possible.
+constexpr double kRoomM = 0.02;
+constexpr std::array<double, 10> kRoomShiftsM{-0.015, 0.015, -0.03, 0.03,   -0.045,
+                                              0.045,  -0.06, 0.06,  -0.075, 0.075};
 
 // After this many alternatives that the library cannot reach, the step is given up.
 constexpr int kMaxOutOfReach = 3;
@@ -84,9 +91,10 @@ class StepPlanner {
     moving_ = moving;
     outward_ = moving == Foot::kLeft ? 1.0 : -1.0;
     fixed_m_ = stance_.feet[static_cast<std::size_t>(OtherFoot(moving))].position_m;
-    const Footprint wanted{step.print.position_m,
-                           UnwrapAngle(step.print.heading_rad, stance_.heading_rad)};
+    Footprint wanted{step.print.position_m,
+                     UnwrapAngle(step.print.heading_rad, stance_.heading_rad)};
     if (terrain_ == nullptr) return PlanExactStep(Level(wanted), step.root_m);
+    if (!step.is_last) wanted = WithRoom(wanted);
     if (IsGood(wanted)) return PlanExactStep(OnGround(wanted), step.root_m);
     if (step.is_last) return std::nullopt;
     int out_of_reach = 0;
@@ -98,6 +106,7 @@ class StepPlanner {
         const double way = wanted.heading_rad + kAround[static_cast<std::size_t>(i)];
         Footprint print = wanted;
         print.position_m += RotateYaw(way, DVec3(0.0, 0.0, ring_m));
+        print = WithRoom(print);
         if (!KeepsApart(print) || !IsGood(print)) continue;
         if (auto plan = PlanExactStep(OnGround(print), step.root_m)) return plan;
         if (++out_of_reach >= kMaxOutOfReach) return std::nullopt;
@@ -145,6 +154,29 @@ class StepPlanner {
     const FootSupport support = SupportOf(*terrain_, library_.leg_rig().side(foot), print);
     return support.normal.y >= kLeastWalkNormalY && support.carried >= kLeastCarried &&
            support.gap_m <= kDeepestGapM && support.rise_m <= kHighestRiseM;
+  }
+
+  // Returns true if no higher ground is right in front of the toes or behind the heel.
+  bool HasRoom(const Footprint& print) const {
+    const LegRig::Side& side = library_.leg_rig().side(moving_);
+    const double ground_m = terrain_->HeightAt(print.position_m.x, print.position_m.z);
+    for (const double end_m : {side.toe_m, -side.foot_m - kSoleBehindAnkleM}) {
+      const DVec3 at = print.position_m + RotateYaw(print.heading_rad, DVec3(0.0, 0.0, end_m));
+      if (terrain_->HighestWithin(at.x, at.z, kRoomM) > ground_m + kHighestRiseM) return false;
+    }
+    return true;
+  }
+
+  // Returns the footprint, moved forward or backward if its toes or heel would touch a riser and
+  // the tread leaves them room.
+  Footprint WithRoom(const Footprint& print) const {
+    if (HasRoom(print)) return print;
+    for (const double shift_m : kRoomShiftsM) {
+      Footprint moved = print;
+      moved.position_m += RotateYaw(print.heading_rad, DVec3(0.0, 0.0, shift_m));
+      if (HasRoom(moved) && Carries(moving_, moved)) return moved;
+    }
+    return print;
   }
 
   bool IsGood(const Footprint& print) {

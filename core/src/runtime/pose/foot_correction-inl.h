@@ -16,7 +16,8 @@ struct TrajectoryOf {
   Vector from, to, release_offset, release_velocity, land_offset, land_velocity, aside;
   Number height[3], turn[3];
   Vector residual_offset, residual_velocity, root_shift;
-  Number from_heading, to_heading, release_turn, root_weight, lift, residual_turn, residual_turn_s;
+  Number from_heading, to_heading, release_turn, root_weight, residual_turn, residual_turn_s;
+  Number lift[3];
   Number residual_over_s, release_s, land_s;
 };
 
@@ -30,13 +31,12 @@ struct CorrectionOf {
   Vector root_shift;  // Part of FootTrajectory::root_shift_m that is complete.
 };
 
-// Returns the share of the lift that is added at a fraction of the swing.
+// Returns the share of a lift that is added at a fraction of the swing.
 template <typename Number>
-STRIDEWIRE_INLINE Number LiftShareOf(Number swing) {
-  const Number one = Constant<Number>(1.0);
-  const Number fade = Constant<Number>(kLiftFade);
-  return (one - EaseOut(DivideBy(swing, kLiftFade))) *
-         EaseOut(DivideBy(swing - (one - fade), kLiftFade));
+STRIDEWIRE_INLINE Number LiftShareOf(const LiftCurve& curve, Number swing) {
+  return (Constant<Number>(1.0) -
+          EaseOut(DivideBy(swing - Constant<Number>(curve.begin), curve.top - curve.begin))) *
+         EaseOut(DivideBy(swing - Constant<Number>(curve.falls), curve.end - curve.falls));
 }
 
 // Returns the part of the body's extra turn (Movement::extra_turn_rad) that is complete at a time.
@@ -79,7 +79,9 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   const Number rise_start = Select(rise > zero, zero, Constant<Number>(kSinkStart));
   const Number risen = one - EaseOut(DivideBy(s - rise_start, 1.0 - kSinkStart));
   c.offset.y = height[0] + settled * (height[1] - height[0]) + rise * risen +
-               trajectory.lift * LiftShareOf(s);
+               trajectory.lift[0] * LiftShareOf(kLiftCurves[0], s) +
+               trajectory.lift[1] * LiftShareOf(kLiftCurves[1], s) +
+               trajectory.lift[2] * LiftShareOf(kLiftCurves[2], s);
 
   // The extra turn of the body does not rotate a standing foot. During its swing, the foot catches
   // up with the turn that the body will have made by the time it lands.

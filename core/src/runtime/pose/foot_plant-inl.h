@@ -69,7 +69,7 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   q = next();
   t.release_velocity = XyzOf(q), t.root_weight = q.w;
   q = next();
-  t.land_offset = XyzOf(q), t.lift = q.w;
+  t.land_offset = XyzOf(q), t.lift[1] = q.w;
   q = next();
   t.land_velocity = XyzOf(q), t.residual_turn = q.w;
   q = next();
@@ -80,8 +80,10 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   t.turn[0] = q.x, t.turn[1] = q.y, t.turn[2] = q.z, t.release_s = q.w;
   q = next();
   t.normals[0] = XyzOf(q), t.land_s = q.w;
-  t.normals[1] = XyzOf(next());
-  t.residual_offset = XyzOf(next());
+  q = next();
+  t.normals[1] = XyzOf(q), t.lift[0] = q.w;
+  q = next();
+  t.residual_offset = XyzOf(q), t.lift[2] = q.w;
   t.residual_velocity = XyzOf(next());
   t.root_shift = XyzOf(next());
   return t;
@@ -365,7 +367,12 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
           (Float(1.0f) - second) *
               DepthBelow(trajectory.from, trajectory.normals[0], bones, leg, at, c.turn) +
           second * DepthBelow(trajectory.to, trajectory.normals[1], bones, leg, at, c.turn);
-      // The root follows this lift as it follows the other corrections of the foot.
+      // The root follows this lift as it follows the other corrections of the foot. The shares of
+      // the two feet change gradually, because the feet swap their roles from step to step.
+      const Float entered = common.OfEaseOut(common.time_s - common.start_offset_s);
+      const Float share =
+          trajectory.root_weight +
+          EaseOut(entered) * (Float(1.0f) - trajectory.root_weight - trajectory.root_weight);
       const Mask is_settling = common.plant_fade_s > Float(0.0f);
       const Float settled =
           Float(1.0f) - EaseOut((common.time_s - common.start_offset_s) /
@@ -373,7 +380,7 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
       const Float lifted =
           Select(keeps_above, Select(is_settling, lift * settled, lift), Float(0.0f));
       c.offset.y = c.offset.y + lifted;
-      c.root.y = c.root.y + lifted * trajectory.root_weight;
+      c.root.y = c.root.y + lifted * share;
     }
     ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
     shift = shift + c.root;

@@ -67,9 +67,9 @@ TrajectoryOf<double, DVec3> TrajectoryFor(const FootPlan& plan, Foot foot) {
           .to_heading = from.to.heading_rad,
           .release_turn = from.release_turn_rad,
           .root_weight = from.root_weight,
-          .lift = from.lift_m,
           .residual_turn = residual.turn_rad,
           .residual_turn_s = residual.turn_rad_s,
+          .lift = {from.lift_m[0], from.lift_m[1], from.lift_m[2]},
           .residual_over_s = residual.over_s,
           .release_s = from.release_s,
           .land_s = from.land_s};
@@ -86,7 +86,7 @@ DVec3 RootShare(const FootCorrection& correction) {
 
 }  // namespace
 
-double LiftShare(double swing) { return LiftShareOf(swing); }
+double LiftShare(std::size_t lift, double swing) { return LiftShareOf(kLiftCurves[lift], swing); }
 
 Quat TurnOf(const FootCorrection& correction) {
   return RotationFromUp(correction.normal) * YawRotation(correction.turn_rad);
@@ -236,15 +236,15 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     add(trajectory.to.position_m - base, WrapAngle(trajectory.to.heading_rad));
     add(trajectory.release_offset_m, trajectory.release_turn_rad);
     add(trajectory.release_velocity_m_s, trajectory.root_weight);
-    add(trajectory.land_offset_m, trajectory.lift_m);
+    add(trajectory.land_offset_m, trajectory.lift_m[1]);
     add(trajectory.land_velocity_m_s, residual.turn_rad);
     add(trajectory.aside_m, residual.turn_rad_s);
     add({trajectory.height_m[0], trajectory.height_m[1], trajectory.height_m[2]}, residual.over_s);
     add({trajectory.turn_rad[0], trajectory.turn_rad[1], trajectory.turn_rad[2]},
         trajectory.release_s);
     add(DVec3(trajectory.normals[0]), trajectory.land_s);
-    add(DVec3(trajectory.normals[1]), 0.0);
-    add(residual.offset_m, 0.0);
+    add(DVec3(trajectory.normals[1]), trajectory.lift_m[0]);
+    add(residual.offset_m, trajectory.lift_m[2]);
     add(residual.offset_m_s, 0.0);
     add(trajectory.root_shift_m, 0.0);
   }

@@ -34,9 +34,8 @@ struct FootCorrection {
   DVec3 root_shift_m = DVec3(0.0);
 };
 
-/// Returns the fraction of `lift_m` that is added at a fraction of the swing. The foot rises early
-/// and comes down late, as when stepping over an edge.
-[[nodiscard]] double LiftShare(double swing);
+/// Returns the fraction of FootTrajectory::lift_m[lift] that is added at a fraction of the swing.
+[[nodiscard]] double LiftShare(std::size_t lift, double swing);
 
 /// Returns the rotation of a corrected foot about its ball, in world axes.
 [[nodiscard]] Quat TurnOf(const FootCorrection& correction);

@@ -26,8 +26,14 @@ inline constexpr double kGroundBlendLength = 0.4;
 // A foot that lands lower than it started descends after this fraction of the swing. A foot that
 // lands higher finishes its rise by the same fraction before the end of the swing.
 inline constexpr double kSinkStart = 0.35;
-// Fraction of the swing, at each end, in which the extra lift of a foot fades in and out.
-inline constexpr double kLiftFade = 0.35;
+// A curve that rises from 0 to 1, stays there and falls back to 0, at fractions of the swing.
+struct LiftCurve {
+  double begin, top, falls, end;
+};
+// Curves of the extra lifts of a foot early, in the middle and late in its swing. One curve for the
+// whole swing would lift a foot that grazes the edge of a tread at its start or end far too high.
+inline constexpr LiftCurve kLiftCurves[3] = {
+    {0.0, 0.22, 0.22, 0.6}, {0.0, 0.35, 0.65, 1.0}, {0.4, 0.78, 0.78, 1.0}};
 // Flatness (LegPose::Flatness) of a standing foot at which its heading lock is zero (kHeelUp) and
 // at which it is complete (kSoleDown).
 inline constexpr double kHeelUp = 0.5;
