@@ -1,6 +1,14 @@
-"""Writes the C++ code of the protocol: limits, message types, checks, decoding and encoding."""
+"""Writes the C++ code of the protocol: limits, message structs, checks, decoding and encoding."""
+
+import re
 
 HEAD = "// Generated from {schema} by protocol/generator. Do not edit.\n"
+# Type aliases of message_parts.h, by the name of the field.
+ALIASES = {"seq": "Seq", "last_seq": "Seq", "world": "WorldId", "avatar": "AvatarId",
+           "avatars": "AvatarId", "subscription": "SubscriptionId", "request_id": "RequestId"}
+CPP_TYPES = {"bool": "bool", "string": "std::string", "ubyte": "std::uint8_t",
+             "short": "std::int16_t", "ushort": "std::uint16_t", "uint": "std::uint32_t",
+             "ulong": "std::uint64_t", "float": "float", "double": "double"}
 CPP_INTEGERS = {"ubyte": "std::uint8_t", "ushort": "std::uint16_t", "uint": "std::uint32_t",
                 "ulong": "std::size_t", "int": "int"}
 
@@ -232,11 +240,100 @@ class Cpp:
 
     def message_type_header(self):
         values = "".join(f"  k{m.name} = {m.get('message')},\n" for m in self.schema.messages)
+        enums = "\n".join(self.enum(e) for e in self.schema.enums.values()
+                          if "handwritten" not in e.attributes)
         return (self.head() + "#pragma once\n\n#include <cstdint>\n\n"
                 "namespace stridewire::protocol {\n\n"
                 "/// Message types in the frame header. Numbers are never reused.\n"
-                f"enum class MessageType : std::uint16_t {{\n{values}}};\n\n"
+                f"enum class MessageType : std::uint16_t {{\n{values}}};\n\n{enums}\n"
                 "}  // namespace stridewire::protocol\n")
+
+    # ---- message structs
+
+    def member_type(self, f):
+        if f.name in ALIASES and f.type in ("uint", "ulong"):
+            name = ALIASES[f.name]
+        elif f.get("enumerators") or f.type in self.schema.enums or f.type in self.schema.tables:
+            name = self.type_name(f.get("enumerators") or f.type)
+        elif "status" in f or "bytes" in f:
+            name = "StatusCode" if "status" in f else "std::byte"
+        else:
+            name = CPP_TYPES[f.type]
+        if f.is_list and name != "ParameterSet":
+            return f"std::vector<{name}>"
+        is_optional = f.default == "null" or "optional" in f
+        return f"std::optional<{name}>" if is_optional else name
+
+    def initializer(self, f, type_name):
+        if "initial" in f:
+            return f" = {f.get('initial')}"
+        if f.is_list or f.type == "string" or type_name.startswith("std::optional"):
+            return ""
+        if f.type in self.schema.enums:
+            return f" = {type_name}::k{next(iter(self.schema.enums[f.type].values))}"
+        if f.type in self.schema.tables:
+            zero = {"DVec3": "0.0", "Vec3": "0.0f"}.get(type_name)
+            return f" = {type_name}({zero})" if zero else ""
+        if f.type == "bool":
+            return " = true" if "inverted" in f else " = false"
+        if "status" in f:
+            return " = StatusCode::kOk"
+        return f" = {f.default or ('0.0' if self.is_float(f) else '0')}"
+
+    def struct(self, table):
+        lines = [f"/// {line}" for line in table.doc] + [f"struct {self.type_name(table.name)} {{"]
+        if "message" in table:
+            lines.append(f"  static constexpr MessageType kType = MessageType::k{table.name};")
+        groups = {}  # Members that several fields share, and how many: legs[0], legs[1].
+        for f in table.fields:
+            name = re.split(r"[.\[]", f.get("cpp", f.name))[0]
+            groups[name] = groups.get(name, 0) + 1
+            if groups[name] > 1:
+                continue
+            lines += [f"  /// {line}" for line in f.doc]
+            if "[" in f.get("cpp", ""):
+                size = sum(other.get("cpp", "").startswith(f"{name}[") for other in table.fields)
+                lines.append(f"  std::array<{self.member_type(f)}, {size}> {name};")
+            elif "group" in f:
+                lines.append(f"  {f.get('group')} {name};")
+            else:
+                type_name = self.member_type(f)
+                lines.append(f"  {type_name} {name}{self.initializer(f, type_name)};")
+        equal = f"bool operator==(const {self.type_name(table.name)}&) const = default;"
+        return "\n".join(lines + [f"  {equal}", "};"]) + "\n"
+
+    def enum(self, enum):
+        lines = [f"/// {line}" for line in enum.doc]
+        lines.append(f"enum class {self.type_name(enum.name)} : std::uint8_t {{")
+        for name, number in enum.values.items():
+            lines += [f"  /// {line}" for line in enum.value_docs[name]]
+            lines.append(f"  k{name} = {number},")
+        return "\n".join(lines + ["};"]) + "\n"
+
+    def in_order_of_use(self):
+        """Tables whose structs are generated, each after those that it contains."""
+        done = []
+
+        def add(table):
+            if table in done or "native" in table or table.by_hand("struct"):
+                return
+            for f in table.fields:
+                if f.type in self.schema.tables:
+                    add(self.schema.tables[f.type])
+            done.append(table)
+
+        for table in self.schema.tables.values():
+            add(table)
+        return done
+
+    def structs_header(self):
+        alternatives = ", ".join(self.type_name(m.name) for m in self.schema.messages)
+        return (self.head() + "#pragma once\n\n"
+                '#include "stridewire/protocol/message_parts.h"\n\n'
+                "namespace stridewire::protocol {\n\n" +
+                "\n".join(self.struct(t) for t in self.in_order_of_use()) +
+                f"\n/// Any message.\nusing Message = std::variant<{alternatives}>;\n"
+                "\n}  // namespace stridewire::protocol\n")
 
     def message_list(self):
         """An X macro over all messages: struct, name on the wire, senders, whether it is bulk."""

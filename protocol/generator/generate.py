@@ -2,9 +2,9 @@
 """Generates code from the schema of the protocol: generate.py SCHEMA KIND FOLDER.
 
 KIND is one of:
-  cpp   limits.h, message_type.h, message_list.h, codec.h and codec.cpp
+  cpp   limits.h, message_type.h, message_structs.h, message_list.h, codec.h and codec.cpp
   json  fields_json.h and fields_json.cpp, for the test vectors
-  web   limits.ts and layout.ts, for the web client
+  web   limits.ts, messages.ts, decoders.ts and tables.ts, for the web client
 
 Files that would not change are left alone, so that nothing is compiled again.
 """
@@ -23,6 +23,7 @@ def files(schema, kind):
         cpp = Cpp(schema)
         return {"include/stridewire/protocol/limits.h": cpp.limits_header(),
                 "include/stridewire/protocol/message_type.h": cpp.message_type_header(),
+                "include/stridewire/protocol/message_structs.h": cpp.structs_header(),
                 "message_list.h": cpp.message_list(),
                 "codec.h": cpp.codec_header(),
                 "codec.cpp": cpp.codec_source()}
@@ -31,7 +32,8 @@ def files(schema, kind):
         return {"fields_json.h": json.header(), "fields_json.cpp": json.source()}
     if kind == "web":
         web = TypeScript(schema)
-        return {"limits.ts": web.limits(), "layout.ts": web.layout()}
+        return {"limits.ts": web.limits(), "messages.ts": web.messages(),
+                "decoders.ts": web.decoders(), "tables.ts": web.tables()}
     sys.exit(f"generate.py: unknown kind '{kind}'\n{__doc__}")
 
 

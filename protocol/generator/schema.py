@@ -15,11 +15,11 @@ TABLE_ATTRIBUTES = {
     "bulk", "cpp", "handwritten", "in_order", "meaning", "message", "native", "sender",
 }
 FIELD_ATTRIBUTES = {
-    "above", "below", "bytes", "cpp", "deprecated", "early", "enumerators", "inverted",
-    "json_array", "json_omit", "json_place", "keep_empty", "max", "min", "nonzero", "omit_zero",
-    "optional", "shared", "status",
+    "above", "below", "bytes", "cpp", "deprecated", "early", "enumerators", "group",
+    "initial", "inverted", "json_array", "json_omit", "json_place", "keep_empty", "max", "min",
+    "nonzero", "number", "omit_zero", "only", "optional", "shared", "status", "web",
 }
-ENUM_ATTRIBUTES = {"cpp"}
+ENUM_ATTRIBUTES = {"cpp", "handwritten"}
 
 
 class SchemaError(Exception):
@@ -31,7 +31,9 @@ class Enum:
     name: str
     attributes: dict
     line: int
-    values: dict = field(default_factory=dict)
+    doc: list
+    values: dict = field(default_factory=dict)  # Name: number.
+    value_docs: dict = field(default_factory=dict)
 
 
 @dataclass
@@ -59,6 +61,7 @@ class Table:
     is_struct: bool
     attributes: dict
     line: int
+    doc: list
     all_fields: list = field(default_factory=list)  # Deprecated ones included: the wire layout.
 
     def __contains__(self, attribute):
@@ -126,15 +129,16 @@ class Schema:
             if match := re.match(r"\s*///\s?(.*)", raw):
                 doc.append(match[1])
                 continue
-            for part in re.split(r"([{};])", re.sub(r"//.*", "", raw)):
-                if part not in ("{", "}", ";"):
+            for part in re.split(r"([{};,])", re.sub(r"//.*", "", raw)):
+                ends_value = part == "," and isinstance(body, Enum)
+                if part not in ("{", "}", ";") and not ends_value:
                     start = start if statement.strip() else line
                     statement += part + " "
                     continue
                 words, statement = statement.strip(), ""
                 if part == "{":
-                    body = self._declaration(words, start)
-                elif part == ";" or isinstance(body, Enum):
+                    body = self._declaration(words, start, doc)
+                elif part == ";" or (isinstance(body, Enum) and words):
                     self._statement(body, words, start, doc)
                 elif words:
                     self.fail(start, f"expected ';' after '{words}'")
@@ -155,7 +159,7 @@ class Schema:
             attributes[match[1]] = match[2] or ""
         return attributes
 
-    def _declaration(self, text, line):
+    def _declaration(self, text, line, doc):
         match = re.fullmatch(r"(table|struct|enum)\s+(\w+)\s*(?::\s*(\w+)\s*)?(?:\((.*)\))?",
                              text, re.S)
         if not match:
@@ -165,21 +169,22 @@ class Schema:
             if base != "ubyte":
                 self.fail(line, f"enum {name}: expected the type ubyte, got '{base}'")
             attributes = self._attributes(attributes, ENUM_ATTRIBUTES, line, f"enum {name}")
-            return self.enums.setdefault(name, Enum(name, attributes, line))
+            return self.enums.setdefault(name, Enum(name, attributes, line, doc))
         attributes = self._attributes(attributes, TABLE_ATTRIBUTES, line, f"{kind} {name}")
-        return self.tables.setdefault(name, Table(name, kind == "struct", attributes, line))
+        return self.tables.setdefault(name, Table(name, kind == "struct", attributes, line, doc))
 
     def _statement(self, body, text, line, doc):
         if body is None:
             if not re.fullmatch(r'namespace\s+[\w.]+|attribute\s+"\w+"', text):
                 self.fail(line, f"expected a declaration, got '{text}'")
         elif isinstance(body, Enum):
-            for position, value in enumerate(filter(None, map(str.strip, text.split(",")))):
-                match = re.fullmatch(r"(\w+)\s*=\s*(\d+)", value)
-                if not match or int(match[2]) != position:
-                    self.fail(line, f"enum {body.name}: expected '{position}' for the value "
-                                    f"number {position}, got '{value}'")
-                body.values[match[1]] = position
+            match = re.fullmatch(r"(\w+)\s*=\s*(\d+)", text)
+            position = len(body.values)
+            if not match or int(match[2]) != position:
+                self.fail(line, f"enum {body.name}: expected '{position}' for the value "
+                                f"number {position}, got '{text}'")
+            body.values[match[1]] = position
+            body.value_docs[match[1]] = doc
         else:
             match = re.fullmatch(r"(\w+)\s*:\s*(\[)?\s*(\w+)\s*\]?\s*(?:=\s*([-\w.]+)\s*)?"
                                  r"(?:\((.*)\))?", text, re.S)

@@ -1,44 +1,45 @@
+#include <concepts>
 #include <optional>
 
 #include "codec_support.h"
+#include "request_fields.h"
 
 /// Encodes, decodes and checks what the schema's attributes cannot express: a requested movement,
 /// whose type decides which fields it uses, sets of parameters, and lists of movement records.
 namespace stridewire::protocol {
 
+namespace {
+
+constexpr Bounds kWaypoints = {0, kMaxWaypoints, "expected at most 64 entries"};
+
+void CheckValue(Findings& found, const FieldPath& at, std::unsigned_integral auto id) {
+  found.NonZero(id, at);
+}
+void CheckValue(Findings&, const FieldPath&, bool) {}
+void CheckValue(Findings& found, const FieldPath& at, double value) { found.Finite(value, at); }
+void CheckValue(Findings& found, const FieldPath& at, const std::optional<double>& value) {
+  found.Finite(value.value_or(0.0), at);
+}
+void CheckValue(Findings& found, const FieldPath& at, const DVec3& value) {
+  CheckFields(found, at, value);
+}
+void CheckValue(Findings& found, const FieldPath& at, const std::vector<DVec3>& waypoints_m) {
+  CheckList(found, waypoints_m, kWaypoints, at);
+}
+template <typename E>
+  requires std::is_enum_v<E>
+void CheckValue(Findings& found, const FieldPath& at, E value) {
+  found.Known(value, std::is_same_v<E, MovementType> ? 3 : 2, at, "expected a number from 0 to 2");
+}
+
+}  // namespace
+
 void CheckFields(Findings& found, const FieldPath& at, const RequestItem& item) {
-  const auto finite = [&](double value, const char* name) { found.Finite(value, At(at, name)); };
-  const auto finite_if = [&](const std::optional<double>& value, const char* name) {
-    finite(value.value_or(0.0), name);
-  };
-  found.NonZero(item.avatar, At(at, "avatar"));
-  found.NonZero(item.request_id, At(at, "request_id"));
-  found.Known(item.interrupt, 2, At(at, "takeover"), "expected a number from 0 to 2");
-  if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
-    found.Known(step->foot, 2, At(at, "foot"), "expected a number from 0 to 2");
-    finite(step->length_m, "length_m");
-    finite_if(step->side_m, "side_m");
-    finite(step->height_m, "height_m");
-    finite(step->turn_rad, "turn_rad");
-    if (step->at) {
-      CheckFields(found, At(at, "at_m"), step->at->position_m);
-      finite_if(step->at->heading_rad, "heading_rad");
-    }
-    found.That(step->at || !step->exact_only, ErrorCode::kMalformed, "must_be_met requires at_m",
-               At(at, "at_m"));
-  } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
-    finite(jump->length_m, "length_m");
-    finite(jump->height_m, "height_m");
-    finite(jump->turn_rad, "turn_rad");
-  } else if (const auto* stand = std::get_if<StandMovement>(&item.movement)) {
-    finite(stand->seconds, "seconds");
-  } else if (const auto* walk = std::get_if<WalkMovement>(&item.movement)) {
-    CheckFields(found, At(at, "at_m"), walk->position_m);
-    finite(walk->heading_rad, "heading_rad");
-    CheckList(found, walk->waypoints_m, {0, kMaxWaypoints, "expected at most 64 entries"},
-              At(at, "waypoints_m"));
-    finite_if(walk->speed_m_s, "speed_m_s");
-  }
+  VisitRequest(
+      item, [&](const char* name, const auto& value) { CheckValue(found, At(at, name), value); });
+  const auto* step = std::get_if<StepMovement>(&item.movement);
+  found.That(step == nullptr || step->at || !step->exact_only, ErrorCode::kMalformed,
+             "must_be_met requires at_m", At(at, "at_m"));
 }
 
 void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, RequestItem& item) {
@@ -71,8 +72,7 @@ void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, Reques
       }
       WalkMovement walk{.heading_rad = *w.heading_rad(), .speed_m_s = w.speed_m_s()};
       Unpack(u, at, *w.at_m(), walk.position_m);
-      UnpackList(u, w.waypoints_m(), {0, kMaxWaypoints, "expected at most 64 entries"},
-                 At(at, "waypoints_m"), walk.waypoints_m);
+      UnpackList(u, w.waypoints_m(), kWaypoints, At(at, "waypoints_m"), walk.waypoints_m);
       item.movement = std::move(walk);
       break;
     }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -13,21 +14,54 @@ namespace stridewire::protocol {
 
 using Json = nlohmann::ordered_json;
 
-/// Converts a 64-bit integer, which JSON numbers cannot represent in every language.
-[[nodiscard]] inline std::string Decimal(std::uint64_t value) { return std::to_string(value); }
+// Value converts a member of a message, and Fields a struct. 64-bit integers become decimal
+// strings, because JSON numbers cannot represent them in every language. Enumerators become
+// numbers, and opaque bytes hexadecimal digits.
 
-template <typename E>
-[[nodiscard]] int Number(E e) {
-  return static_cast<int>(e);
+[[nodiscard]] inline Json Value(std::uint64_t value) { return std::to_string(value); }
+[[nodiscard]] Json Value(const std::vector<std::byte>& bytes);
+[[nodiscard]] Json Value(const ParameterSet& set);
+[[nodiscard]] inline Json Value(const std::string& text) { return text; }
+template <typename T>
+  requires std::is_arithmetic_v<T>
+[[nodiscard]] Json Value(T value) {
+  return value;
 }
-
-[[nodiscard]] std::string Hex(const std::vector<std::byte>& bytes);
-[[nodiscard]] Json ListJson(const ParameterSet& set);
-
+template <typename E>
+  requires std::is_enum_v<E>
+[[nodiscard]] Json Value(E value) {
+  return static_cast<int>(value);
+}
 template <typename V>
   requires std::is_same_v<V, Vec3> || std::is_same_v<V, DVec3>
-[[nodiscard]] Json Fields(const V& v) {
+[[nodiscard]] Json Value(const V& v) {
   return Json::array({v.x, v.y, v.z});
+}
+
+// FromJson is the reverse of Fields. It throws the exceptions of nlohmann::json for JSON of another
+// shape.
+
+template <typename T>
+  requires std::is_arithmetic_v<T>
+void FromJson(const Json& json, T& out) {
+  if (json.is_string()) {
+    out = static_cast<T>(std::stoull(json.get<std::string>()));
+  } else {
+    json.get_to(out);
+  }
+}
+template <typename E>
+  requires std::is_enum_v<E>
+void FromJson(const Json& json, E& out) {
+  out = static_cast<E>(json.get<std::underlying_type_t<E>>());
+}
+inline void FromJson(const Json& json, std::string& out) { json.get_to(out); }
+void FromJson(const Json& json, std::vector<std::byte>& out);
+void FromJson(const Json& json, ParameterSet& out);
+template <typename V>
+  requires std::is_same_v<V, Vec3> || std::is_same_v<V, DVec3>
+void FromJson(const Json& json, V& v) {
+  for (int i = 0; i < 3; ++i) json.at(static_cast<std::size_t>(i)).get_to(v[i]);
 }
 
 }  // namespace stridewire::protocol
@@ -37,17 +71,36 @@ template <typename V>
 namespace stridewire::protocol {
 
 template <typename T>
-[[nodiscard]] Json ListJson(const std::vector<T>& list) {
+  requires requires(const T& message) { Fields(message); }
+[[nodiscard]] Json Value(const T& message) {
+  return Fields(message);
+}
+template <typename T>
+[[nodiscard]] Json Value(const std::vector<T>& list) {
   Json json = Json::array();
-  for (const T& entry : list) json.push_back(Fields(entry));
+  for (const T& entry : list) json.push_back(Value(entry));
   return json;
 }
+template <typename T>
+[[nodiscard]] Json Value(const std::optional<T>& value) {
+  return value ? Value(*value) : Json(nullptr);
+}
 
-template <typename E>
-[[nodiscard]] Json NumbersJson(const std::vector<E>& list) {
-  Json json = Json::array();
-  for (const E entry : list) json.push_back(Number(entry));
-  return json;
+template <typename T>
+void FromJson(const Json& json, std::vector<T>& out) {
+  out.resize(json.size());
+  for (std::size_t i = 0; i < out.size(); ++i) FromJson(json.at(i), out[i]);
+}
+template <typename T>
+void FromJson(const Json& json, std::optional<T>& out) {
+  out.reset();
+  if (!json.is_null()) FromJson(json, out.emplace());
+}
+
+/// Reads a member of an object. A member that is not there keeps its value.
+template <typename T>
+void Get(const Json& json, const char* name, T& out) {
+  if (const auto member = json.find(name); member != json.end()) FromJson(*member, out);
 }
 
 }  // namespace stridewire::protocol

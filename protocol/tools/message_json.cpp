@@ -1,15 +1,18 @@
 #include "message_json.h"
 
+#include <stdexcept>
 #include <string>
 
 #include "base/check.h"
 #include "json_support.h"
+#include "message_list.h"
+#include "request_fields.h"
 #include "sample_messages.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {
 
-std::string Hex(const std::vector<std::byte>& bytes) {
+Json Value(const std::vector<std::byte>& bytes) {
   static constexpr char kDigits[] = "0123456789abcdef";
   std::string text;
   for (const std::byte b : bytes) {
@@ -22,48 +25,33 @@ std::string Hex(const std::vector<std::byte>& bytes) {
 Json Fields(const RotationQuantization& code) {
   const Quat& q = code.reference;
   return {{"reference", Json::array({q.x, q.y, q.z, q.w})},
-          {"low", Fields(code.low)},
-          {"step", Fields(code.step)},
+          {"low", Value(code.low)},
+          {"step", Value(code.step)},
           {"bits", code.bits},
           {"free_bits", code.smallest_three_bits},
           {"least_w", code.least_w}};
 }
 
 Json Fields(const RequestItem& item) {
-  Json json = {{"avatar", item.avatar},
-               {"request_id", Decimal(item.request_id)},
-               {"type", item.movement.index()},
-               {"takeover", Number(item.interrupt)}};
-  if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
-    json["foot"] = Number(step->foot);
-    if (step->at) {
-      json["at_m"] = Fields(step->at->position_m);
-      json["heading_rad"] = step->at->heading_rad ? Json(*step->at->heading_rad) : Json(nullptr);
-      json["must_be_met"] = step->exact_only;
-      return json;
-    }
-    json["length_m"] = step->length_m;
-    json["side_m"] = step->side_m ? Json(*step->side_m) : Json(nullptr);
-    json["height_m"] = step->height_m;
-    json["turn_rad"] = step->turn_rad;
-  } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
-    json["length_m"] = jump->length_m;
-    json["height_m"] = jump->height_m;
-    json["turn_rad"] = jump->turn_rad;
-  } else if (const auto* stand = std::get_if<StandMovement>(&item.movement)) {
-    json["seconds"] = stand->seconds;
-  } else {
-    const auto& walk = std::get<WalkMovement>(item.movement);
-    json["at_m"] = Fields(walk.position_m);
-    json["heading_rad"] = walk.heading_rad;
-    json["waypoints_m"] = Json::array();
-    for (const DVec3& place : walk.waypoints_m) json["waypoints_m"].push_back(Fields(place));
-    json["speed_m_s"] = walk.speed_m_s ? Json(*walk.speed_m_s) : Json(nullptr);
-  }
+  Json json = Json::object();
+  VisitRequest(item, [&](const char* name, const auto& value) { json[name] = Value(value); });
   return json;
 }
 
-Json ListJson(const ParameterSet& set) {
+void FromJson(const Json& json, RequestItem& item) {
+  const auto type = json.at("type").get<MovementType>();
+  if (type == MovementType::kJump) item.movement = JumpMovement{};
+  if (type == MovementType::kStand) item.movement = StandMovement{};
+  if (type == MovementType::kWalk) item.movement = WalkMovement{};
+  if (type == MovementType::kStep && json.contains("at_m")) {
+    item.movement = StepMovement{.at = Footprint{}};
+  }
+  VisitRequest(item, [&]<typename T>(const char* name, T& value) {
+    if constexpr (!std::is_const_v<T>) Get(json, name, value);
+  });
+}
+
+Json Value(const ParameterSet& set) {
   Json json = Json::array();
   for (std::size_t p = 0; p < set.count; ++p) {
     json.push_back({{"name", set.names[p]}, {"value", set.values[p]}});
@@ -83,30 +71,71 @@ Json Fields(const PoseBatch& m) {
     for (const Quat& q : rotations) quats.push_back(Json::array({q.x, q.y, q.z, q.w}));
     poses.push_back({{"avatar", m.avatars[i]},
                      {"flags", m.flags[i]},
-                     {"root_position_m", Fields(root)},
+                     {"root_position_m", Value(root)},
                      {"rotations", quats}});
   }
   Json json = {{"world", m.info.world},
                {"shard", m.info.shard},
                {"part", m.info.part},
                {"parts", m.info.parts},
-               {"tick", Decimal(m.info.tick)},
+               {"tick", Value(m.info.tick)},
                {"server_time_s", m.info.server_time_s},
-               {"mode", Number(m.info.mode)},
+               {"mode", Value(m.info.mode)},
                {"joint_count", m.info.joint_count},
                {"poses", poses}};
   if (m.info.is_partial) json["partial"] = true;
   return json;
 }
 
+void FromJson(const Json& json, std::vector<std::byte>& out) {
+  const auto text = json.get<std::string>();
+  out.clear();
+  for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
+    out.push_back(static_cast<std::byte>(std::stoi(text.substr(i, 2), nullptr, 16)));
+  }
+}
+
+void FromJson(const Json& json, RotationQuantization& code) {
+  const std::vector<float> q = json.at("reference");
+  code.reference = Quat(q.at(3), q.at(0), q.at(1), q.at(2));
+  Get(json, "low", code.low);
+  Get(json, "step", code.step);
+  json.at("bits").get_to(code.bits);
+  Get(json, "free_bits", code.smallest_three_bits);
+  Get(json, "least_w", code.least_w);
+}
+
+void FromJson(const Json& json, ParameterSet& set) {
+  set = {};
+  for (const Json& parameter : json) {
+    Get(parameter, "name", set.names.at(set.count));
+    Get(parameter, "value", set.values.at(set.count++));
+  }
+}
+
 Json ToJson(const Message& message) {
   return std::visit(
       [](const auto& m) {
-        Json json = {{"type", MessageTypeName(m.kType)}, {"type_number", Number(m.kType)}};
+        Json json = {{"type", MessageTypeName(m.kType)}, {"type_number", Value(m.kType)}};
         json["fields"] = Fields(m);
         return json;
       },
       message);
+}
+
+Message FromJson(const Json& json) {
+  const auto name = json.at("type").get<std::string>();
+#define STRIDEWIRE_CASE(Struct, Name, ...)            \
+  if constexpr (!std::is_same_v<Struct, PoseBatch>) { \
+    if (name == #Name) {                              \
+      Struct message;                                 \
+      FromJson(json.at("fields"), message);           \
+      return message;                                 \
+    }                                                 \
+  }
+  STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)
+#undef STRIDEWIRE_CASE
+  throw std::invalid_argument("no message \"" + name + "\" can be read from JSON");
 }
 
 }  // namespace stridewire::protocol

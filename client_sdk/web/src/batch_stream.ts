@@ -1,4 +1,4 @@
-import type {BatchMode, PoseBatch} from './wire/messages';
+import type {BatchMode, DecodableBatch as PoseBatch} from './wire/messages';
 
 const batchModes: readonly BatchMode[] =
     ['full', 'quantised', 'compact', 'compactFewer', 'compactRoot'];

@@ -3,7 +3,7 @@ import {createKeys, copyPose, interpolate} from './interpolate';
 import {reserve} from './pose_buffers';
 import {flagsOf, lastingFlags} from './pose_flags';
 import {PoseFlag, type CrowdPose, type Recording, type WorldEvent} from './types';
-import type {BatchMode, PoseBatch} from './wire/messages';
+import type {BatchMode, DecodableBatch as PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
 /** Time after the last batch of its stream for which an avatar can be sampled. */

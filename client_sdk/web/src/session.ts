@@ -9,6 +9,7 @@ import type {
   AvatarState, Observation, Region, Reply, Role, Subscription, WorldEvent
 } from './types';
 import * as check from './wire/check';
+import {avatarStateOf, eventOf, terrainOf} from './wire/convert';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
@@ -17,8 +18,9 @@ import {
 } from '../generated/limits';
 import {Malformed} from './wire/malformed';
 import type {
-  AvatarStateMessage, ClientMessage, CommandMessage, ErrorNotice, Events, Goodbye, Lagging, Pong,
-  PoseBatch, ReplyMessage, ServerLimits, SpawnEntry, Welcome, WorldInfo, WorldTerrain
+  AvatarState as AvatarStateMessage, BatchMode, ClientMessage, CommandMessage, ErrorNotice, Events,
+  Goodbye, Lagging, Pong, PoseBatch, Reply as ReplyMessage, ServerLimits, SpawnItem as SpawnEntry,
+  Welcome, WorldInfo, WorldTerrain
 } from './wire/messages';
 import {checkName, checkText} from './wire/text';
 import {WorldHandle} from './world';
@@ -958,10 +960,12 @@ export class Session {
     if (world === undefined || world.skeleton === null || world.subscriptions.size === 0) return;
     this.clock.addSample(nowS, message.serverTimeS);
     this.followJitter(nowS);
-    // Stored in the message, because recorded batches may outlive the world's current codecs.
-    message.codec = world.codecs[message.mode] ?? null;
-    world.view.addBatch(message, world.everyNTicks(message.mode));
-    world.record.addBatch(message, world.view.epoch);
+    const mode = message.mode as BatchMode;
+    // Stored in the batch, because recorded batches may outlive the world's current codecs.
+    const codec = world.codecs[mode as keyof typeof world.codecs] ?? null;
+    const batch = {...message, mode, codec};
+    world.view.addBatch(batch, world.everyNTicks(mode));
+    world.record.addBatch(batch, world.view.epoch);
   }
 
   private followJitter(nowS: number): void {
@@ -989,7 +993,7 @@ export class Session {
     }
     const world = this.findWorld(message.world);
     if (world === undefined) return;
-    for (const event of message.events) {
+    for (const event of message.events.map(eventOf)) {
       ++this.total.eventsReceived;
       this.followSpawned(world, event);
       world.record.addEvent(event);
@@ -1033,7 +1037,7 @@ export class Session {
 
   private onTerrain(message: WorldTerrain): void {
     const world = this.findWorld(message.world);
-    if (world !== undefined) world.terrain = message.terrain;
+    if (world !== undefined) world.terrain = terrainOf(message.terrain);
   }
 
   private onPong(message: Pong, nowS: number): void {
@@ -1046,8 +1050,8 @@ export class Session {
     const inspection = this.inspections.get(message.nonce);
     if (inspection === undefined) return;
     this.inspections.delete(message.nonce);
-    const {code, text, state} = message;
-    this.later(() => code === Status.ok ? inspection.resolve(state)
+    const {code, text} = message;
+    this.later(() => code === Status.ok ? inspection.resolve(avatarStateOf(message))
                                         : inspection.reject(new StridewireError(code, text)));
   }
 

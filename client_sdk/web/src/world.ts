@@ -9,7 +9,7 @@ import type {
 } from './types';
 import * as check from './wire/check';
 import {CompactCodec} from './wire/compact_codec';
-import type {BatchMode, Observe, SpawnEntry, WorldInfo} from './wire/messages';
+import type {BatchMode, Observe, SpawnItem as SpawnEntry, WorldInfo} from './wire/messages';
 import type {WorldView} from './world_view';
 
 /** A subscription that the client keeps up across lost sessions. */
@@ -126,11 +126,11 @@ export class WorldHandle implements World {
     }
     this.libraryHash = info.libraryHash;
     this.layers = info.layers;
-    const {rotationCodes: codes, fewerJoints} = info;
+    const {rotationCodes: codes, reducedJoints} = info;
     this.codecs = codes.length === 0 ? {} : {
       compact: new CompactCodec(codes),
       compactRoot: new CompactCodec(codes, [0]),
-      ...(fewerJoints.length > 0 ? {compactFewer: new CompactCodec(codes, fewerJoints)} : {}),
+      ...(reducedJoints.length > 0 ? {compactFewer: new CompactCodec(codes, reducedJoints)} : {}),
     };
   }
 
@@ -178,18 +178,19 @@ export class WorldHandle implements World {
   }
 }
 
-function toSkeleton(info: WorldInfo): Skeleton {
-  const jointCount = info.joints.length;
+function toSkeleton({skeleton}: WorldInfo): Skeleton {
+  const {joints, endSites, leftLeg, rightLeg} = skeleton;
+  const jointCount = joints.length;
   const offsetsM = new Float32Array(3 * jointCount);
-  info.joints.forEach((joint, j) => offsetsM.set(joint.offsetM, 3 * j));
+  joints.forEach((joint, j) => offsetsM.set(joint.offsetM, 3 * j));
   return {
     jointCount,
-    names: info.joints.map((joint) => joint.name),
-    parents: Int16Array.from(info.joints, (joint) => joint.parent),
+    names: joints.map((joint) => joint.name),
+    parents: Int16Array.from(joints, (joint) => joint.parent),
     offsetsM,
-    endSites: info.endSites,
-    leftLeg: info.leftLeg,
-    rightLeg: info.rightLeg,
+    endSites,
+    leftLeg,
+    rightLeg,
   };
 }
 

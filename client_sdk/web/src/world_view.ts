@@ -5,7 +5,7 @@ import {PoseHistory} from './pose_history';
 import {PoseFlag, type CrowdPose, type Pose, type PoseKind} from './types';
 import {maxItems} from '../generated/limits';
 import {Malformed} from './wire/malformed';
-import type {PoseBatch} from './wire/messages';
+import type {DecodableBatch as PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
 /** Time for which the poses of a removed avatar can still be sampled. */

@@ -2,6 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {Session, defaultOptions} from '../src/session';
 import type {PoseDetail, Region, Reply, Terrain} from '../src/types';
+import {terrainOf} from '../src/wire/convert';
 import * as server from './support/server_frames';
 import {Harness, statusOf, summary} from './support/session_harness';
 
@@ -103,7 +104,7 @@ test('sends terrain and footprints unchanged', async () => {
   ]);
   const [first, second, third] = h.sent();
   assert.ok(first?.type === 'SetTerrain' && second?.type === 'SetTerrain');
-  assert.deepEqual(first.terrain, {
+  assert.deepEqual(terrainOf(first.terrain), {
     heightField: {...heightField, heightsM: Float32Array.of(0, 0.5, 1, 1.5)}, boxes
   });
   assert.equal(second.terrain, null);
@@ -191,8 +192,8 @@ test('sends layers', async () => {
   const [sent] = h.sent();
   assert.ok(sent?.type === 'SetLayers');
   assert.deepEqual(sent.items, [
-    {avatar: 1, layer: 'wave', off: false, weight: 1, blendS: 0.3, speed: 1},
-    {avatar: 2, layer: 'carry', off: true, weight: 1, blendS: 0, speed: 1},
+    {avatar: 1, layer: 'wave', fadeOut: false, weight: 1, blendS: 0.3, speed: 1},
+    {avatar: 2, layer: 'carry', fadeOut: true, weight: 1, blendS: 0, speed: 1},
   ]);
   for (const wrong of [{avatar: 0, layer: 'wave'}, {avatar: 1, layer: ''}, {avatar: 1},
                        {avatar: 1, layer: 'wave', weight: NaN},
@@ -207,8 +208,8 @@ test('sends foot planting', async () => {
   void world.setPlanting([1, 7], false);
   void world.setPlanting([7], true);
   const sent = h.sent();
-  assert.deepEqual(sent.map((m) => m.type === 'SetPlanting' && [[...m.avatars], m.off]),
-                   [[[1, 7], true], [[7], false]]);
+  assert.deepEqual(sent.map((m) => m.type === 'SetPlanting' && [[...m.avatars], m.enabled]),
+                   [[[1, 7], false], [[7], true]]);
   for (const [avatars, enabled] of [[[], true], [[0], true], [[1], 1]]) {
     const reply = await world.setPlanting(avatars as never, enabled as never);
     assert.equal(reply.status, 'invalid_argument');

@@ -1,7 +1,8 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {decodeFrame} from '../src/wire/decode';
-import {MessageType, type Sender} from '../src/wire/frame';
+import {MessageType} from '../generated/messages';
+import type {Sender} from '../src/wire/frame';
 import {Malformed} from '../src/wire/malformed';
 import {numberFrom} from './support/environment';
 import {checkMessage} from './support/known';

@@ -3,8 +3,8 @@ import {test} from 'node:test';
 import type {CompactCodec} from '../src/wire/compact_codec';
 import {decodeFrame} from '../src/wire/decode';
 import {Encoder} from '../src/wire/encode';
-import {MessageType} from '../src/wire/frame';
-import type {ClientMessage} from '../src/wire/messages';
+import {MessageType} from '../generated/messages';
+import type {BatchMode, ClientMessage} from '../src/wire/messages';
 import {PoseReader} from '../src/wire/pose_codec';
 import {toJson} from './support/to_json';
 import {readVectors, vectorCodec} from './support/vectors';
@@ -77,7 +77,7 @@ test('decodes compact poses in any order, and only with their codec', () => {
   assert.ok(batch.type === 'PoseBatch');
   assert.equal(batch.flags[1]! & 4, 4, 'the second pose is wide');
   const read = (codec: CompactCodec | null, order: number[]): (number[] | null)[] => {
-    const reader = new PoseReader({...batch, codec});
+    const reader = new PoseReader({...batch, mode: 'compact', codec});
     const poses: (number[] | null)[] = [];
     for (const i of order) {
       const rootM = new Float32Array(3);
@@ -100,13 +100,14 @@ test('sets joints that a detail leaves out to their references', () => {
     const batch = decodeFrame(vectors.find((vector) => vector.name === name)!.frame, 'server');
     assert.ok(batch.type === 'PoseBatch');
     const rotations = new Float32Array(4 * batch.jointCount);
-    assert.ok(new PoseReader({...batch, codec: vectorCodec(batch.mode)})
+    const mode = batch.mode as BatchMode;
+    assert.ok(new PoseReader({...batch, mode, codec: vectorCodec(mode)})
       .read(0, new Float32Array(3), 0, rotations, 0));
     return rotations;
   };
   const all = read('pose_batch_compact');
-  const batches: [string, readonly number[]][] =
-      [['pose_batch_fewer', info.fewerJoints], ['pose_batch_root', [0]]];
+  const batches: [string, {includes(joint: number): boolean}][] =
+      [['pose_batch_fewer', info.reducedJoints], ['pose_batch_root', [0]]];
   for (const [name, joints] of batches) {
     const rotations = read(name);
     info.rotationCodes.forEach(({reference}, j) => {

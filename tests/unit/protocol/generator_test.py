@@ -2,6 +2,7 @@
 """Tests of protocol/generator on small schemas: generator_test.py ROOT."""
 
 import pathlib
+import re
 import sys
 import unittest
 
@@ -20,7 +21,10 @@ table Limits {
   /// Items per message.
   max_items: ulong = 65536;
 }
-enum Color: ubyte { Red = 0, Green = 1 }
+/// Color of paint.
+enum Color: ubyte { Red = 0,
+  /// Not blue.
+  Green = 1 }
 struct Point { x: double; z: float; }
 table Item { avatar: uint (nonzero); speed_m_s: double = null (min: "0"); }
 // A comment; with a semicolon.
@@ -112,22 +116,85 @@ class CppTest(unittest.TestCase):
         self.assertIn("/// Items per message.\ninline constexpr std::size_t kMaxItems = 65536;",
                       self.cpp.limits_header())
         self.assertIn("kPaint = 7,", self.cpp.message_type_header())
+        self.assertIn("/// Color of paint.\nenum class Color : std::uint8_t {\n  kRed = 0,\n"
+                      "  /// Not blue.\n  kGreen = 1,\n};", self.cpp.message_type_header())
         self.assertIn("X(Paint, Paint, true, false, true)", self.cpp.message_list())
+
+    def test_writes_structs(self):
+        header = self.cpp.structs_header()
+        for line in ("struct Item {\n  AvatarId avatar = 0;\n  std::optional<double> speed_m_s;",
+                     "  static constexpr MessageType kType = MessageType::kPaint;\n  Seq seq = 0;",
+                     "  Color color = Color::kRed;", "  std::vector<Item> items;",
+                     "  bool visible = true;", "using Message = std::variant<Paint>;"):
+            self.assertIn(line, header)
 
     def test_writes_json(self):
         source = CppJson(read(SMALL)).source()
-        self.assertIn('json["seq"] = Decimal(m.seq);', source)
+        self.assertIn('json["seq"] = Value(m.seq);', source)
         self.assertIn('json["hidden"] = !m.visible;', source)
-        self.assertIn('json["speed_m_s"] = m.speed_m_s ? Json(*m.speed_m_s) : Json(nullptr);',
-                      source)
+        self.assertIn('m.visible = !json.at("hidden").get<bool>();', source)
+        self.assertIn('Get(json, "speed_m_s", m.speed_m_s);', source)
 
 
 class TypeScriptTest(unittest.TestCase):
-    def test_writes_limits_and_layouts(self):
-        web = TypeScript(read(SMALL))
-        self.assertIn("/** Items per message. */\nexport const maxItems = 65536;", web.limits())
-        self.assertIn("[[0, 8, 8], [0, 4, 4], [0, 1, 1], [1, 1, 1], [4, 0, 4], [0, 1, 1], "
-                      "[0, 16, 8]],", web.layout())
+    def setUp(self):
+        self.web = TypeScript(read(SMALL))
+
+    def test_writes_limits(self):
+        self.assertIn("/** Items per message. */\nexport const maxItems = 65536;",
+                      self.web.limits())
+
+    def test_writes_interfaces_with_the_names_of_cpp(self):
+        messages = self.web.messages()
+        for line in ("Color: ['red', 'green'],", "speedMS: number | null;", "visible: boolean;",
+                     "color: Color;", "place: readonly [number, number];", "Paint: 7,",
+                     "bulkMessages: readonly MessageName[] = ['Paint'];"):
+            self.assertIn(line, messages)
+        self.assertNotIn("old", messages)
+
+    def test_writes_decoders_with_checks(self):
+        decoders = self.web.decoders()
+        for line in ("seq: r.nonzero(r.ulong(r.at(at, 0)), 'seq'),",
+                     "color: r.known(r.ubyte(r.at(at, 2), 0), enums.Color, 1, 'color'),",
+                     "text: r.text(r.at(at, 3), 'text', 0, 16),",
+                     "items: r.list(r.at(at, 4), 'items', 1, 65536, 0, readItem),",
+                     "visible: !r.bool(r.at(at, 5)),"):
+            self.assertIn(line, decoders)
+
+    def test_writes_layouts(self):
+        tables = self.web.tables()
+        self.assertIn('"name": "items", "layout": [4, 1, 4], "type": "table", "table": 1, '
+                      '"list": true', tables)
+        self.assertIn('"name": "place", "layout": [0, 16, 8]', tables)
+        self.assertIn('"name": "z", "layout": [0, 4, 4], "type": "float", "initial": 0.0, "at": 8',
+                      tables)
+
+
+class StandardTest(unittest.TestCase):
+    """STANDARD.md agrees with the schema."""
+
+    def setUp(self):
+        folder = ROOT / "protocol"
+        self.schema = read((folder / "schema" / "stridewire.fbs").read_text(encoding="utf-8"))
+        self.standard = (folder / "STANDARD.md").read_text(encoding="utf-8")
+
+    def test_lists_all_messages(self):
+        rows = re.findall(r"^\| (\d+) \| (\w+) \| (client|server|both) \| (\d+ [KM]iB) \|$",
+                          self.standard, re.M)
+        caps = {True: "16 MiB", False: "1 MiB"}
+        expected = [(m.get("message"), m.name, m.get("sender"),
+                     "16 KiB" if m.name == "Hello" else caps["bulk" in m])
+                    for m in self.schema.messages]
+        self.assertEqual(rows, expected)
+
+    def test_describes_every_field(self):
+        for table in self.schema.tables.values():
+            if table.name in ("RotationCode", "Vec3", "Offset", "Rotation", "ParameterValue",
+                              "GroundPoint"):
+                continue
+            for f in table.all_fields:
+                with self.subTest(table=table.name, field=f.name):
+                    self.assertRegex(self.standard, rf"`(\w+\.)*{f.name}`")
 
 
 if __name__ == "__main__":

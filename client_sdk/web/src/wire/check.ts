@@ -1,16 +1,16 @@
 import type {
   LayerRequest, MovementRequest, Observation, PoseDetail, PoseMode, QueuedRequest, Region, Role,
-  SpawnItem, Terrain, TerrainBox, Vec3
+  SpawnItem, Terrain, Vec3
 } from '../types';
-import {footChoices, interrupts, movementTypes, poseDetails, poseModes, roles} from './decode';
 import {
   maxEveryNTicks, maxItems, maxNameBytes, maxRateRings, maxTerrainBoxes,
   maxTerrainColumns, maxWaypoints
 } from '../../generated/limits';
 import {Malformed} from './malformed';
+import {enums} from '../../generated/messages';
 import type {
-  CancelQueue, JoinWorld, LayerEntry, Observe, RegionEntry, Remove, Request, SetLayers,
-  SetPlanting, SetTerrain, Spawn
+  CancelQueue, JoinWorld, LayerItem, Observe, Region as RegionEntry, Remove, Request, SetLayers,
+  SetPlanting, SetTerrain, Spawn, TerrainBoxInfo
 } from './messages';
 import {checkName} from './text';
 
@@ -82,7 +82,7 @@ function avatarList(avatars: readonly number[], least: number, field: string): U
 
 export function joinWorld(name: string, role: Role): JoinWorld {
   checkName(name, maxNameBytes, 'name');
-  return {type: 'JoinWorld', seq: 0n, name, role: oneOf(roles, role, 'role')};
+  return {type: 'JoinWorld', seq: 0n, name, role: oneOf(enums.Role, role, 'role')};
 }
 
 export function spawn(items: readonly SpawnItem[]): Spawn {
@@ -116,7 +116,7 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
       if (item === null || typeof item !== 'object') {
         throw new Malformed('expected an object', 'items', i);
       }
-      const type = oneOf(movementTypes, item.type, 'type', i);
+      const type = oneOf(enums.MovementType, item.type, 'type', i);
       const step = type === 'step';
       const walk = type === 'walk';
       const at = walk || (step && item.atM !== undefined) ? vector(item.atM, 'atM', i) : null;
@@ -132,7 +132,7 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
         avatar: avatarNumber(item.avatar, 1, 'avatar', i),
         requestId: item.requestId === undefined ? nextId() : requestId(item.requestId, i),
         type,
-        foot: step ? oneOf(footChoices, item.foot ?? 'auto', 'foot', i) : 'auto',
+        foot: step ? oneOf(enums.FootChoice, item.foot ?? 'auto', 'foot', i) : 'auto',
         atM: at,
         headingRad: at !== null && (walk || item.headingRad !== undefined)
             ? finite(item.headingRad, 'headingRad', i) : null,
@@ -144,7 +144,7 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
         waypointsM: walk ? waypoints(item.waypointsM ?? [], i) : [],
         speedMPerS: walk && item.speedMPerS !== undefined
             ? finite(item.speedMPerS, 'speedMPerS', i) : null,
-        interrupt: oneOf(interrupts, item.interrupt ?? 'none', 'interrupt', i),
+        interrupt: oneOf(enums.Takeover, item.interrupt ?? 'none', 'interrupt', i),
         exactOnly,
       };
     }),
@@ -197,13 +197,16 @@ export function setTerrain(terrain: Terrain | null): SetTerrain {
   }
   message.terrain = {
     heightField,
-    boxes: Array.from(boxes, (box, b): TerrainBox => {
+    boxes: Array.from(boxes, (box, b): TerrainBoxInfo => {
       const minM = place(box?.minM, 'boxes.minM', b);
       const maxM = place(box?.maxM, 'boxes.maxM', b);
       if (!(minM[0] < maxM[0] && minM[1] < maxM[1])) {
         throw new Malformed('expected both numbers to be above minM', 'boxes.maxM', b);
       }
-      return {minM, maxM, heightM: finite(box.heightM, 'boxes.heightM', b)};
+      return {
+        minX: minM[0], minZ: minM[1], maxX: maxM[0], maxZ: maxM[1],
+        heightM: finite(box.heightM, 'boxes.heightM', b),
+      };
     }),
   };
   return message;
@@ -214,7 +217,7 @@ export function setLayers(items: readonly LayerRequest[]): SetLayers {
     type: 'SetLayers',
     seq: 0n,
     world: 0,
-    items: list(items, 1, 'items').map((item, i): LayerEntry => {
+    items: list(items, 1, 'items').map((item, i): LayerItem => {
       if (item === null || typeof item !== 'object') {
         throw new Malformed('expected an object', 'items', i);
       }
@@ -226,7 +229,7 @@ export function setLayers(items: readonly LayerRequest[]): SetLayers {
       return {
         avatar: avatarNumber(item.avatar, 1, 'avatar', i),
         layer: item.layer,
-        off: !enabled,
+        fadeOut: !enabled,
         weight: finite(item.weight ?? 1, 'weight', i),
         blendS: finite(item.blendS ?? 0.3, 'blendS', i),
         speed: finite(item.speed ?? 1, 'speed', i),
@@ -242,7 +245,7 @@ export function setPlanting(avatars: readonly number[], enabled: boolean): SetPl
     seq: 0n,
     world: 0,
     avatars: avatarList(avatars, 1, 'avatars'),
-    off: !enabled,
+    enabled,
   };
 }
 
@@ -251,8 +254,8 @@ export function observe(observation: Observation): Observe {
     throw new Malformed('expected an object', 'observation');
   }
   const everyNTicks = tickInterval(observation.everyNTicks ?? 1, 'everyNTicks');
-  const mode = oneOf(poseModes.slice(0, 2) as PoseMode[], observation.mode, 'mode');
-  const detail = oneOf(poseDetails, observation.detail ?? 'all', 'detail');
+  const mode = oneOf<PoseMode>(['full', 'quantised'], observation.mode, 'mode');
+  const detail = oneOf(enums.PoseDetail, observation.detail ?? 'all', 'detail');
   if (detail !== 'all' && mode !== 'quantised') {
     throw new Malformed(`requires mode quantised, got ${mode}`, 'detail');
   }
@@ -314,12 +317,12 @@ export function region(asked: Region, mode: Observe['mode'], beyond: PoseDetail)
     throw new Malformed(`requires mode quantised, got ${mode}`, 'rings.detail');
   }
   return {
-    x: finite(asked.x, 'x', -1),
-    z: finite(asked.z, 'z', -1),
+    centreM: [finite(asked.x, 'x', -1), finite(asked.z, 'z', -1)],
     radiusM,
     leaveM,
     rings: rings.map(({outerRadiusM, everyNTicks}) => ({toM: outerRadiusM, everyNTicks})),
     ringDetails: hasDetails
-        ? rings.map(({detail}, i) => oneOf(poseDetails, detail ?? beyond, 'rings.detail', i)) : [],
+        ? rings.map(({detail}, i) =>
+            oneOf(enums.PoseDetail, detail ?? beyond, 'rings.detail', i)) : [],
   };
 }

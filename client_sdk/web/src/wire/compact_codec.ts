@@ -1,10 +1,14 @@
 import {Malformed} from './malformed';
-import type {RotationCode} from './messages';
+import type {RotationQuantization as RotationCode} from './messages';
 
 const maxThreeSquared = 0.77;
 const leastToldW = 0.9;
 const rootStepM = 1 / 16384;
 const maxRootSteps = 131_071 * 16384;
+
+function bitsOf({bitsX, bitsY, bitsZ}: RotationCode): [number, number, number] {
+  return [bitsX, bitsY, bitsZ];
+}
 
 /**
  * Checks a world's rotation codes against protocol/STANDARD.md, "Poses".
@@ -18,7 +22,8 @@ export function checkRotationCodes(codes: readonly RotationCode[], jointCount: n
     const wrong = (what: string): never => {
       throw new Malformed(what, 'WorldInfo.rotationCodes', j);
     };
-    const {freeBits, reference, low, step, bits, leastW} = code;
+    const {smallestThreeBits: freeBits, reference, low, step, leastW} = code;
+    const bits = bitsOf(code);
     if (freeBits !== 0 ? freeBits < 8 || freeBits > 15 : j === 0) {
       wrong('free_bits is not 8 to 15; 0 is allowed except for the root');
     }
@@ -37,9 +42,9 @@ export function checkRotationCodes(codes: readonly RotationCode[], jointCount: n
  * Checks the joints that reduced poses contain.
  * @throws Malformed they are not ascending from the root, or a joint's parent is missing
  */
-export function checkFewerJoints(joints: readonly number[], parents: readonly number[]): void {
+export function checkFewerJoints(joints: Uint16Array, parents: readonly number[]): void {
   const wrong = (what: string, i: number): never => {
-    throw new Malformed(what, 'WorldInfo.fewerJoints', i);
+    throw new Malformed(what, 'WorldInfo.reducedJoints', i);
   };
   if (joints.length > parents.length) wrong('has more entries than joints', -1);
   joints.forEach((joint, i) => {
@@ -69,22 +74,24 @@ export class CompactCodec {
    * poses contain and must pass checkFewerJoints; empty: all joints. Other joints are set to their
    * references.
    */
-  constructor(codes: readonly RotationCode[], told: readonly number[] = []) {
+  constructor(codes: readonly RotationCode[], told: ArrayLike<number> = []) {
+    const contained = new Set(Array.from(told));
     this.jointCount = codes.length;
     this.bits = new Uint8Array(4 * codes.length);
     this.numbers = new Float64Array(11 * codes.length);
     let count = 0;
     codes.forEach((code, j) => {
-      if (told.length > 0 && !told.includes(j)) {
+      if (contained.size > 0 && !contained.has(j)) {
         this.numbers.set(code.reference, 11 * j);  // If all other numbers are 0, w becomes 1.
         return;
       }
-      const {freeBits} = code;
-      this.bits.set([freeBits, ...code.bits], 4 * j);
+      const {smallestThreeBits: freeBits} = code;
+      const bits = bitsOf(code);
+      this.bits.set([freeBits, ...bits], 4 * j);
       const step = freeBits > 0 ? [1 / (Math.SQRT2 * (2 ** (freeBits - 1) - 1)), 0, 0] : code.step;
       this.numbers.set([...code.reference, ...code.low, ...step, (leastToldW * code.leastW) ** 2],
                        11 * j);
-      count += freeBits > 0 ? 2 + 3 * freeBits : code.bits[0] + code.bits[1] + code.bits[2];
+      count += freeBits > 0 ? 2 + 3 * freeBits : bits[0] + bits[1] + bits[2];
     });
     this.poseBytes = 12 + 2 * Math.ceil(count / 16);
   }

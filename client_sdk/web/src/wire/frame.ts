@@ -1,38 +1,7 @@
 import {maxBulkBytes, maxControlBytes, maxHelloBytes} from '../../generated/limits';
+import {bulkMessages, MessageType, type MessageName} from '../../generated/messages';
 import {Malformed} from './malformed';
 
-/** Numbers of the message types. */
-export const MessageType = {
-  Hello: 1,
-  JoinWorld: 2,
-  LeaveWorld: 3,
-  Spawn: 4,
-  Remove: 5,
-  Request: 6,
-  CancelQueue: 7,
-  Observe: 8,
-  StopObserving: 9,
-  Ping: 10,
-  InspectAvatar: 11,
-  SetTerrain: 12,
-  SetLayers: 13,
-  SetPlanting: 14,
-  FetchLibrary: 15,
-  Goodbye: 32,
-  Welcome: 64,
-  WorldInfo: 65,
-  Reply: 66,
-  PoseBatch: 67,
-  Events: 68,
-  Lagging: 69,
-  Error: 70,
-  Pong: 71,
-  AvatarState: 72,
-  WorldTerrain: 73,
-  Movements: 74,
-  LibraryPiece: 75,
-} as const;
-export type MessageName = keyof typeof MessageType;
 export type Sender = 'client' | 'server';
 
 export const frameHeaderBytes = 16;
@@ -41,10 +10,7 @@ const frameVersion = 1;
 
 const names = new Map<number, MessageName>(
     Object.entries(MessageType).map(([name, type]) => [type, name as MessageName]));
-const bulk = new Set<MessageName>([
-  'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe', 'Reply', 'PoseBatch', 'Events',
-  'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'Movements', 'LibraryPiece'
-]);
+const bulk = new Set(bulkMessages);
 
 export function isBulk(name: MessageName): boolean {
   return bulk.has(name);

@@ -4,30 +4,15 @@ const decoder = new TextDecoder('utf-8', {fatal: true, ignoreBOM: true});
 const encoder = new TextEncoder();
 const controls = /[\u0000-\u001f\u007f-\u009f]/;
 
-/**
- * Decodes a text of at most `maxBytes` bytes.
- * @throws Malformed the text is too long, is not UTF-8, or has control characters
- */
-export function readText(bytes: Uint8Array | null, maxBytes: number, field: string,
-                         index = -1): string {
-  if (bytes === null || bytes.length === 0) return '';
-  if (bytes.length > maxBytes) throw new Malformed('text is too long', field, index);
+/** Decodes a text. Calls `fail` if it is not UTF-8 or has control characters. */
+export function readText(bytes: Uint8Array, fail: (what: string) => never): string {
   let text;
   try {
     text = decoder.decode(bytes);
   } catch {
-    throw new Malformed('text is not UTF-8', field, index);
+    return fail('text is not UTF-8');
   }
-  if (controls.test(text)) throw new Malformed('text has control characters', field, index);
-  return text;
-}
-
-/** Same as readText, but rejects an empty text. */
-export function readName(bytes: Uint8Array | null, maxBytes: number, field: string,
-                         index = -1): string {
-  const name = readText(bytes, maxBytes, field, index);
-  if (name === '') throw new Malformed('name is empty', field, index);
-  return name;
+  return controls.test(text) ? fail('text has control characters') : text;
 }
 
 /**

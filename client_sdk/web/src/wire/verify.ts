@@ -1,5 +1,5 @@
-import {tableLayouts} from '../../generated/layout';
 import {maxDepth} from '../../generated/limits';
+import {tables} from '../../generated/tables';
 
 /**
  * Returns true if a FlatBuffers message can be read safely. All data reachable from the root must
@@ -64,12 +64,12 @@ class Verifier {
         !this.inside(vtable, vtableBytes, 2)) {
       return false;
     }
-    const fields = tableLayouts[number]!;
+    const {fields} = tables[number]!;
     const known = Math.min(fields.length, (vtableBytes - 4) >> 1);
     for (let i = 0; i < known; ++i) {
       const offset = this.view.getUint16(vtable + 4 + 2 * i, true);
       if (offset === 0) continue;
-      if (offset > 0x7fff || !this.field(at + offset, fields[i]!, depth)) return false;
+      if (offset > 0x7fff || !this.field(at + offset, fields[i]!.layout, depth)) return false;
     }
     return true;
   }

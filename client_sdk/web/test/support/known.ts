@@ -1,5 +1,5 @@
 import assert from 'node:assert/strict';
-import type {Message} from '../../src/wire/messages';
+import type {BatchMode, Message} from '../../src/wire/messages';
 import {PoseReader} from '../../src/wire/pose_codec';
 import {vectorCodec} from './vectors';
 
@@ -55,8 +55,8 @@ export function assertValid(value: unknown, field = ''): void {
 export function checkMessage(message: Message): 'valid' | 'invalid pose' {
   assertValid(message);
   if (message.type !== 'PoseBatch') return 'valid';
-  message.codec = vectorCodec(message.mode);
-  const reader = new PoseReader(message);
+  const mode = message.mode as BatchMode;
+  const reader = new PoseReader({...message, mode, codec: vectorCodec(mode)});
   const rootM = new Float32Array(3);
   const rotations = new Float32Array(4 * message.jointCount);
   for (let i = 0; i < message.avatars.length; ++i) {

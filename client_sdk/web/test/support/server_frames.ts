@@ -1,6 +1,6 @@
 import {Builder} from 'flatbuffers';
 import * as wire from '../../generated/wire';
-import {eventTypes} from '../../src/wire/decode';
+import {enums} from '../../generated/messages';
 import {makeFrame} from '../../src/wire/frame';
 import type {WorldEventType} from '../../src/types';
 
@@ -173,7 +173,7 @@ export function events(number: bigint, list: EventFields[], world = 3): ArrayBuf
   const b = builder();
   const offsets = list.map((event) => {
     wire.Event.startEvent(b);
-    wire.Event.addType(b, eventTypes.indexOf(event.type));
+    wire.Event.addType(b, enums.EventType.indexOf(event.type));
     wire.Event.addAvatar(b, event.avatar);
     wire.Event.addRequestId(b, event.requestId ?? 0n);
     wire.Event.addTimeS(b, event.timeS ?? 0);

@@ -1,13 +1,12 @@
-import {
-  eventTypes, footChoices, interrupts, movementKinds, movementTypes, parameterNames, poseDetails,
-  poseModes, roles
-} from '../../src/wire/decode';
-import type {Message} from '../../src/wire/messages';
+import {enums} from '../../generated/messages';
+import type {
+  BatchMode, CurrentMovement, LegInfo as Leg, Message, RequestItem as QueuedRequest,
+  TerrainInfo as Terrain
+} from '../../src/wire/messages';
+import {parameterList} from '../../src/wire/rules';
 import {PoseReader} from '../../src/wire/pose_codec';
 import {vectorCodec} from './vectors';
-import type {
-  CurrentMovement, Leg, Parameters, QueuedRequest, Terrain, Vec3
-} from '../../src/types';
+import type {Parameters, Vec3} from '../../src/types';
 
 type Json = unknown;
 
@@ -16,25 +15,23 @@ const token = (bytes: Uint8Array): Json => Buffer.from(bytes).toString('hex');
 const vec3 = (v: Vec3): Json => [...v];
 
 function parameters(set: Parameters): Json {
-  return Object.entries(set).map(([name, value]) => ({
-    name: parameterNames.indexOf(name as never), value
-  }));
+  return parameterList(set);
 }
 
 function request(item: QueuedRequest): Json {
-  const type = movementTypes.indexOf(item.type);
+  const type = enums.MovementType.indexOf(item.type);
   const common = {avatar: item.avatar, request_id: u64(item.requestId), type,
-    takeover: interrupts.indexOf(item.interrupt)};
+    takeover: enums.Takeover.indexOf(item.interrupt)};
   switch (item.type) {
     case 'step':
       if (item.atM !== null) {
         return {
-          ...common, foot: footChoices.indexOf(item.foot), at_m: vec3(item.atM),
+          ...common, foot: enums.FootChoice.indexOf(item.foot), at_m: vec3(item.atM),
           heading_rad: item.headingRad, must_be_met: item.exactOnly,
         };
       }
       return {
-        ...common, foot: footChoices.indexOf(item.foot), length_m: item.lengthM,
+        ...common, foot: enums.FootChoice.indexOf(item.foot), length_m: item.lengthM,
         side_m: item.sideM, height_m: item.heightM, turn_rad: item.turnRad,
       };
     case 'jump':
@@ -58,8 +55,8 @@ function terrain(from: Terrain | null): Json {
       origin_m: [...field.originM], cell_m: field.cellM, columns: field.columns, rows: field.rows,
       heights_m: [...field.heightsM],
     },
-    boxes: from.boxes.map(({minM, maxM, heightM}) => ({
-      min_x: minM[0], min_z: minM[1], max_x: maxM[0], max_z: maxM[1], height_m: heightM,
+    boxes: from.boxes.map(({minX, minZ, maxX, maxZ, heightM}) => ({
+      min_x: minX, min_z: minZ, max_x: maxX, max_z: maxZ, height_m: heightM,
     })),
   };
 }
@@ -73,11 +70,11 @@ function leg(from: Leg): Json {
 
 function movement(m: CurrentMovement): Json {
   return {
-    request_id: u64(m.requestId), kind: movementKinds.indexOf(m.kind), group: m.group,
+    request_id: u64(m.requestId), kind: enums.MovementKind.indexOf(m.kind), group: m.group,
     started_s: m.startTimeS, keytimes_s: [...m.keytimesS], generic_time: m.genericTime,
     ease_out_s: m.easeOutS, requested: parameters(m.requested), applied: parameters(m.applied),
     extrapolated: m.extrapolated, clamped: m.clamped, weights: [...m.weights],
-    parameter_names: m.parameterNames.map((name) => parameterNames.indexOf(name)),
+    parameter_names: [...m.parameterNames],
     sites: [...m.exampleParameters],
     landings: m.landings.map((l) => ({
       foot: l.foot === 'right' ? 1 : 0, position_m: vec3(l.positionM), heading_rad: l.headingRad})),
@@ -93,7 +90,7 @@ export function toJson(m: Message): {[name: string]: Json} {
         auth_token: m.authToken, resume_token: token(m.resumeToken),
         last_events_number: u64(m.lastEventsNumber),
       };
-    case 'JoinWorld': return {seq: u64(m.seq), name: m.name, role: roles.indexOf(m.role)};
+    case 'JoinWorld': return {seq: u64(m.seq), name: m.name, role: enums.Role.indexOf(m.role)};
     case 'LeaveWorld': return {seq: u64(m.seq), world: m.world};
     case 'Spawn':
       return {
@@ -108,17 +105,17 @@ export function toJson(m: Message): {[name: string]: Json} {
     case 'Observe':
       return {
         seq: u64(m.seq), world: m.world, subscription: m.subscription,
-        mode: poseModes.indexOf(m.mode), avatars: [...m.avatars], every_n_ticks: m.everyNTicks,
+        mode: enums.PoseMode.indexOf(m.mode), avatars: [...m.avatars], every_n_ticks: m.everyNTicks,
         with_events: m.withEvents,
-        ...(m.detail === 'all' ? {} : {detail: poseDetails.indexOf(m.detail)}),
+        ...(m.detail === 'all' ? {} : {detail: enums.PoseDetail.indexOf(m.detail)}),
         ...(m.region === null ? {} : {
           region: {
-            centre_m: {x: m.region.x, z: m.region.z}, radius_m: m.region.radiusM,
+            centre_m: {x: m.region.centreM[0], z: m.region.centreM[1]}, radius_m: m.region.radiusM,
             leave_m: m.region.leaveM,
             rings: m.region.rings.map(({toM, everyNTicks}) => (
                 {to_m: toM, every_n_ticks: everyNTicks})),
             ...(m.region.ringDetails.length === 0 ? {} : {
-              ring_details: m.region.ringDetails.map((detail) => poseDetails.indexOf(detail)),
+              ring_details: m.region.ringDetails.map((detail) => enums.PoseDetail.indexOf(detail)),
             }),
           },
           replace: m.replace,
@@ -155,23 +152,24 @@ export function toJson(m: Message): {[name: string]: Json} {
       };
     case 'WorldInfo':
       return {
-        seq: u64(m.seq), world: m.world, name: m.name, role: roles.indexOf(m.role),
+        seq: u64(m.seq), world: m.world, name: m.name, role: enums.Role.indexOf(m.role),
         tick: u64(m.tick), library_hash: m.libraryHash,
         skeleton: {
-          joints: m.joints.map((joint) => ({
+          joints: m.skeleton.joints.map((joint) => ({
             name: joint.name, parent: joint.parent, offset_m: vec3(joint.offsetM)
           })),
-          end_sites: m.endSites.map((site) => ({
+          end_sites: m.skeleton.endSites.map((site) => ({
             joint: site.joint, offset_m: vec3(site.offsetM)
           })),
-          left_leg: leg(m.leftLeg), right_leg: leg(m.rightLeg),
+          left_leg: leg(m.skeleton.leftLeg), right_leg: leg(m.skeleton.rightLeg),
         },
         layers: [...m.layers],
         rotation_codes: m.rotationCodes.map((code) => ({
           reference: [...code.reference], low: vec3(code.low), step: vec3(code.step),
-          bits: vec3(code.bits), free_bits: code.freeBits, least_w: code.leastW,
+          bits: [code.bitsX, code.bitsY, code.bitsZ], free_bits: code.smallestThreeBits,
+          least_w: code.leastW,
         })),
-        ...(m.fewerJoints.length === 0 ? {} : {fewer_joints: [...m.fewerJoints]}),
+        ...(m.reducedJoints.length === 0 ? {} : {fewer_joints: [...m.reducedJoints]}),
       };
     case 'Reply':
       return {
@@ -183,10 +181,10 @@ export function toJson(m: Message): {[name: string]: Json} {
       };
     case 'PoseBatch': {
       const reader = new PoseReader(
-          {...m, codec: vectorCodec(m.mode)});
+          {...m, mode: m.mode as BatchMode, codec: vectorCodec(m.mode as BatchMode)});
       return {
         world: m.world, shard: m.shard, part: m.part, parts: m.parts, tick: u64(m.tick),
-        server_time_s: m.serverTimeS, mode: poseModes.indexOf(m.mode),
+        server_time_s: m.serverTimeS, mode: enums.PoseMode.indexOf(m.mode),
         joint_count: m.jointCount,
         ...(m.partial ? {partial: true} : {}),
         poses: [...m.avatars].map((avatar, i) => {
@@ -205,8 +203,8 @@ export function toJson(m: Message): {[name: string]: Json} {
       return {
         world: m.world, number: u64(m.number), tick: u64(m.tick),
         events: m.events.map((e) => ({
-          type: eventTypes.indexOf(e.type), avatar: e.avatar, request_id: u64(e.requestId),
-          kind: movementKinds.indexOf(e.kind), group: e.group, tick: u64(e.tick),
+          type: enums.EventType.indexOf(e.type), avatar: e.avatar, request_id: u64(e.requestId),
+          kind: enums.MovementKind.indexOf(e.kind), group: e.group, tick: u64(e.tick),
           time_s: e.timeS, requested: parameters(e.requested), applied: parameters(e.applied),
           extrapolated: e.extrapolated, clamped: e.clamped, cut_short: e.cutShort,
           foot: e.foot === 'right' ? 1 : 0,
@@ -230,15 +228,15 @@ export function toJson(m: Message): {[name: string]: Json} {
       return {
         seq: u64(m.seq), world: m.world,
         items: m.items.map((item) => ({
-          avatar: item.avatar, layer: item.layer, off: item.off, weight: item.weight,
+          avatar: item.avatar, layer: item.layer, off: item.fadeOut, weight: item.weight,
           blend_s: item.blendS, speed: item.speed,
         })),
       };
     case 'SetPlanting':
-      return {seq: u64(m.seq), world: m.world, avatars: [...m.avatars], off: m.off};
+      return {seq: u64(m.seq), world: m.world, avatars: [...m.avatars], off: !m.enabled};
     case 'WorldTerrain': return {world: m.world, terrain: terrain(m.terrain)};
     case 'AvatarState': {
-      const {state} = m;
+      const state = m;
       return {
         nonce: u64(m.nonce), world: m.world, avatar: state.avatar, code: m.code, text: m.text,
         tick: u64(state.tick), server_time_s: state.timeS,

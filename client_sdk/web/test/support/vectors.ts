@@ -40,7 +40,7 @@ export function vectorCodec(mode: BatchMode): CompactCodec | null {
   const info = decodeFrame(vector.frame, 'server');
   if (info.type !== 'WorldInfo') throw new Error('world_info_detail is not a WorldInfo');
   const codec = new CompactCodec(info.rotationCodes,
-    mode === 'compactFewer' ? info.fewerJoints : mode === 'compactRoot' ? [0] : []);
+    mode === 'compactFewer' ? info.reducedJoints : mode === 'compactRoot' ? [0] : []);
   codecs.set(mode, codec);
   return codec;
 }

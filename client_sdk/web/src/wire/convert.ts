@@ -1,0 +1,31 @@
+import type {AvatarState, Terrain, WorldEvent} from '../types';
+import type {AvatarState as AvatarStateMessage, Event, TerrainInfo} from './messages';
+import {parameterNames} from './rules';
+
+/** Conversions of messages to public types that differ from the schema. */
+
+export function terrainOf(from: TerrainInfo | null): Terrain | null {
+  return from && {
+    heightField: from.heightField,
+    boxes: from.boxes.map(({minX, minZ, maxX, maxZ, heightM}) => ({
+      minM: [minX, minZ], maxM: [maxX, maxZ], heightM
+    })),
+  };
+}
+
+export function eventOf(event: Event): WorldEvent {
+  return event.type === 'footStrike' ? event : {...event, foot: null};
+}
+
+export function avatarStateOf(message: AvatarStateMessage): AvatarState {
+  const {type: _, nonce: _nonce, world: _world, code: _code, text: _text, ...state} = message;
+  const {movement} = state;
+  return {
+    ...state,
+    movement: movement && {
+      ...movement,
+      endTimeS: movement.startTimeS + (movement.keytimesS.at(-1) ?? 0),
+      parameterNames: Array.from(movement.parameterNames, (name) => parameterNames[name]!),
+    },
+  };
+}
