@@ -42,7 +42,7 @@ class CppJson(Cpp):
             return [f'json.at("{f.name}").at({i}).get_to({m}.{part.name});'
                     for i, part in enumerate(parts)]
         if "inverted" in f:
-            return [f'{m} = !json.at("{f.name}").get<bool>();']
+            return [f'if (json.contains("{f.name}")) {m} = !json.at("{f.name}").get<bool>();']
         return [f'Get(json, "{f.name}", {m});']
 
     def parse_function(self, table):

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <stdexcept>
 
 #include "message_json.h"
 #include "sample_messages.h"
@@ -22,15 +23,29 @@ bool Write(const std::filesystem::path& path, std::string_view bytes) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::string_view argument = argc == 2 ? argv[1] : "--help";
+  const std::string_view argument = argc > 1 ? argv[1] : "--help";
   if (argument == "--version") {
     std::cout << "protocol_vectors " << stridewire::kVersion << "\n";
     return 0;
   }
+  if (argc == 3 && argument == "--skeleton") {
+    try {
+      const auto json = nlohmann::ordered_json{{"type", argv[2]}, {"fields", nlohmann::json{}}};
+      std::cout << stridewire::protocol::ToJson(stridewire::protocol::FromJson(json)).dump(1)
+                << "\n";
+      return 0;
+    } catch (const std::invalid_argument& error) {
+      std::cerr << "protocol_vectors: --skeleton: " << error.what() << "\n";
+      return 2;
+    }
+  }
   if (argument == "--help") {
-    std::cout << "Usage: protocol_vectors DIR\n"
-                 "Writes the test vectors of the wire protocol to the existing folder DIR.\n"
-                 "Example: build/release/bin/protocol_vectors protocol/vectors\n";
+    std::cout
+        << "Usage: protocol_vectors DIR | --skeleton MESSAGE\n"
+           "Writes the test vectors of the wire protocol to the existing folder DIR. Their\n"
+           "source are the JSON files in protocol/vectors. --skeleton prints such a file for a\n"
+           "message with default values, for example SetPlanting.\n"
+           "Example: build/release/bin/protocol_vectors protocol/vectors\n";
     return argc == 2 ? 0 : 2;
   }
   const std::filesystem::path directory(argument);

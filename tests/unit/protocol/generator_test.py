@@ -132,7 +132,8 @@ class CppTest(unittest.TestCase):
         source = CppJson(read(SMALL)).source()
         self.assertIn('json["seq"] = Value(m.seq);', source)
         self.assertIn('json["hidden"] = !m.visible;', source)
-        self.assertIn('m.visible = !json.at("hidden").get<bool>();', source)
+        self.assertIn('if (json.contains("hidden")) m.visible = !json.at("hidden").get<bool>();',
+                      source)
         self.assertIn('Get(json, "speed_m_s", m.speed_m_s);', source)
 
 

@@ -1,5 +1,6 @@
 #include <set>
 
+#include "message_json.h"
 #include "protocol_testing.h"
 #include "sample_messages.h"
 
@@ -15,6 +16,23 @@ TEST(Messages, RoundTrip) {
     EXPECT_TRUE(SameMessage(sample.message, *decoded));
     EXPECT_EQ(EncodeOrFail(*decoded), frame);
   }
+}
+
+TEST(Messages, RoundTripThroughJson) {
+  for (const SampleMessage& sample : SampleMessages()) {
+    if (std::holds_alternative<PoseBatch>(sample.message)) continue;
+    SCOPED_TRACE(sample.name);
+    EXPECT_TRUE(SameMessage(FromJson(ToJson(sample.message)), sample.message));
+  }
+}
+
+TEST(Messages, HaveASkeletonInJson) {
+  const auto skeleton = [](std::string_view type) {
+    return FromJson({{"type", type}, {"fields", nlohmann::ordered_json::object()}});
+  };
+  EXPECT_EQ(std::get<SetPlanting>(skeleton("SetPlanting")), SetPlanting{});
+  EXPECT_EQ(std::get<WorldInfo>(skeleton("WorldInfo")), WorldInfo{});
+  EXPECT_THROW((void)skeleton("Nothing"), std::invalid_argument);
 }
 
 TEST(Messages, HaveASampleOfEveryType) {
