@@ -25,6 +25,9 @@ constexpr double kWeakMotionCos = 0.35;  // Legs are rather below the hips, as i
 constexpr double kAtZero = 0.12;      // Largest height of a floor that is at zero.
 constexpr double kTravels = 0.6;      // A figure moves at least this far along a horizontal axis...
 constexpr double kTravelRatio = 2.0;  // ... and this many times as far as along the up axis.
+constexpr double kStays = 0.3;        // A floor that is at zero does not move farther than this.
+// Smallest difference of cosines by which the motion prefers one up axis to another.
+constexpr double kClearGain = 0.5;
 constexpr double kClearFeet = 0.5;  // Shortest sum of both unit foot vectors that point somewhere.
 
 DVec3 Unit(const DVec3& v) {
@@ -121,15 +124,20 @@ class AxesFinder {
     const FoundLeg(&legs)[2] = figure_.legs.legs;
     const DVec3 hips = 0.5 * (rest_[Index(legs[0].hip)] + rest_[Index(legs[1].hip)]);
     DVec3 body(0.0);
+    double lowest = INFINITY;
+    double lowest_of_legs = INFINITY;
     for (int j = 1; j < static_cast<int>(rest_.size()); ++j) {
       int top = j;
       while (top > 0 && top != legs[0].hip && top != legs[1].hip) {
         top = figure_.joints[Index(top)].parent;
       }
+      double& low = top <= 0 ? lowest : lowest_of_legs;
+      low = std::min(low, glm::dot(rest_[Index(j)], up));
       if (top <= 0) body += rest_[Index(j)] - hips;
     }
     rest_stands_ = glm::dot(Unit(legs_up), up) >= kRestCos && glm::dot(body, up) >= 0.0 &&
-                   glm::length(legs_up) >= kStraightShare * 2.0 * leg_length_;
+                   glm::length(legs_up) >= kStraightShare * 2.0 * leg_length_ &&
+                   lowest >= lowest_of_legs - kAtZero * leg_length_;
   }
 
   // How the samples of the motion lie along an axis, in file units.
@@ -153,6 +161,10 @@ class AxesFinder {
     return std::fabs(extent.lowest) < kAtZero * leg_length_;
   }
 
+  bool HasFloorAtZero(const Extent& extent) const {
+    return IsAtZero(extent) && extent.travel < kStays * leg_length_;
+  }
+
   // Returns true if the figure stands and moves along `up` as in a file whose up axis that is,
   // instead of lying in a file with the up axis `other`.
   bool StandsAlong(const DVec3& up, const DVec3& other) const {
@@ -160,7 +172,22 @@ class AxesFinder {
     const Extent along_other = ExtentAlong(other);
     const bool travels = along_other.travel > kTravels * leg_length_ &&
                          along_other.travel > kTravelRatio * along_up.travel;
-    return travels || (IsAtZero(along_up) && !IsAtZero(along_other));
+    return travels || (HasFloorAtZero(along_up) && !HasFloorAtZero(along_other));
+  }
+
+  // The up axis of the rest pose in the world. Joints above the root may turn the whole figure by a
+  // fixed rotation. Some programs export a figure with another up axis below such a joint, while in
+  // other files the motion of the hips undoes the rotation. The motion tells them apart.
+  DVec3 RestUpInWorld(const DVec3& mean_legs_up) const {
+    const DVec3 plain = AxisVector(rest_axis_);
+    const DVec3 turned = figure_.fixed_turn * plain;
+    if (glm::dot(plain, turned) > kSnapCos) return turned;
+    const bool plain_has_floor = HasFloorAtZero(ExtentAlong(plain));
+    if (plain_has_floor != HasFloorAtZero(ExtentAlong(turned))) {
+      return plain_has_floor ? plain : turned;
+    }
+    const double gain = glm::dot(mean_legs_up, turned) - glm::dot(mean_legs_up, plain);
+    return gain >= kClearGain ? turned : plain;
   }
 
   void FindUp() {
@@ -174,7 +201,7 @@ class AxesFinder {
     const BvhAxis motion_axis = NearestAxis(mean);
     const DVec3 motion_up = AxisVector(motion_axis);
     const double motion_cos = glm::dot(mean, motion_up);
-    const DVec3 rest_in_world = figure_.fixed_turn * AxisVector(rest_axis_);
+    const DVec3 rest_in_world = RestUpInWorld(mean);
     const BvhAxis rest_axis = NearestAxis(rest_in_world);
     const DVec3 rest_up = AxisVector(rest_axis);
     const bool rest_decides = rest_stands_ && glm::dot(rest_in_world, rest_up) >= kRestCos;
@@ -303,10 +330,12 @@ class AxesFinder {
       Note("the feet point backwards; left and right may be swapped");
     }
     axes_.joint_turn = TurnToOurAxes(left, rest_up);
-    // Joints above the root may turn the whole figure by a fixed rotation.
+    // The world turns like the joint frames if that makes it upright.
     const DQuat turn = glm::normalize(axes_.joint_turn * glm::conjugate(figure_.fixed_turn));
     if ((turn * world_up).y > 0.999) {
       axes_.world_turn = turn;
+    } else if ((axes_.joint_turn * world_up).y > 0.999) {
+      axes_.world_turn = axes_.joint_turn;
     } else {
       const DVec3 other = std::fabs(world_up.x) > 0.9 ? DVec3(0, 0, 1) : DVec3(1, 0, 0);
       axes_.world_turn =

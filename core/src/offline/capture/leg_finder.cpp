@@ -108,8 +108,8 @@ double LowestOf(const Pose& pose, const std::vector<int>& chain, const DVec3& up
 
 // Returns the direction in which the legs carry the body, one of the six axes. Empty if they do
 // not: they point nowhere, or other joints are lower than their ends in most poses.
-std::optional<DVec3> CarryingDirection(const FigureShape& figure, const LimbPair& pair) {
-  const std::span<const Pose> poses = PosesOf(figure);
+std::optional<DVec3> CarryingDirection(const FigureShape& figure, std::span<const Pose> poses,
+                                       const LimbPair& pair) {
   DVec3 sum(0.0);
   for (const Pose& pose : poses) {
     for (const std::vector<int>& chain : pair.chains) {
@@ -186,7 +186,9 @@ Expected<FoundLegs> FindLegsByShape(const FigureShape& figure) {
       continue;
     }
     if (HasNameOutsideLegs(figure, pair)) continue;
-    const std::optional<DVec3> direction = CarryingDirection(figure, pair);
+    std::optional<DVec3> direction = CarryingDirection(figure, PosesOf(figure), pair);
+    // In the motion the figure may hang by its arms.
+    if (!direction) direction = CarryingDirection(figure, std::span(&figure.rest, 1), pair);
     if (!direction) continue;
     best = &pair;
     up = *direction;
@@ -317,7 +319,8 @@ bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
       trunk += 0.5 * (pose[Index(top)] - pose[Index(legs.root)]);
     }
     return highest_hand <= lowest_foot + 0.5 * kFloorShare * length &&
-           glm::dot(trunk, up) < kHorizontalShare * glm::length(trunk) && lowest_hip > lowest_foot;
+           std::fabs(glm::dot(trunk, up)) < kHorizontalShare * glm::length(trunk) &&
+           lowest_hip > lowest_foot;
   };
   const DVec3 rest_up = legs_up(figure.rest);
   const DVec3 rest_axis = AxisVector(NearestAxis(rest_up));

@@ -411,6 +411,58 @@ TEST(BvhFigure, FollowsAMotionThatStandsAlongAnotherAxis) {
   }
 }
 
+// The rotation of a joint above the hips does not belong to the rest pose if the hips undo it.
+TEST(BvhFigure, IgnoresAFixedRotationThatTheHipsUndo) {
+  for (const bool lies : {false, true}) {
+    Figure figure;
+    const int reference = figure.Add("Reference", -1, DVec3(0.0), true);
+    figure.Animate(reference, [](int) { return Figure::Local{DVec3(0.0), DVec3(0, -90, 0)}; });
+    const int hips = figure.Add("Hips", reference, DVec3(0, 0, 90), true);
+    figure.Animate(hips, [=](int f) {  // y and z of the file are z and -y of the reference.
+      return Figure::Local{DVec3(0, lies ? 0.0 : -4.0 * f, lies ? 5 : 84),
+                           DVec3(0, lies ? 0 : 90, 0)};
+    });
+    const Body body = AddBody(figure, hips);
+    if (lies) {  // Keeps the legs on the floor.
+      for (const int side : {0, 1}) {
+        figure.Animate(body.thigh[side], nullptr);
+        figure.Animate(body.shin[side], nullptr);
+      }
+    }
+    const Capture capture = Read(figure.Text());
+    EXPECT_EQ(capture.up, BvhAxis::kPlusY) << lies;
+    EXPECT_NEAR(capture.clip.frame(9).root_position_m.y, lies ? 0.05 : 0.84, 1e-5);
+  }
+}
+
+// Bones of some rigs all point along one axis at rest, so that hands are level with the feet.
+TEST(BvhFigure, ReadsARestPoseWhoseBonesPointAlongOneAxis) {
+  Figure figure;
+  const int hips = figure.Add("Hips", -1, DVec3(0, 90, 0), true);
+  figure.Animate(hips, [](int f) { return Figure::Local{DVec3(0, 84, 4.0 * f), DVec3(0.0)}; });
+  for (const double side : {1.0, -1.0}) {
+    const std::string name = side > 0 ? "Left" : "Right";
+    const int thigh = figure.Add(name + "UpLeg", hips, DVec3(side * 9, -4, 0));
+    figure.Animate(thigh, [](int) { return Figure::Local{DVec3(0.0), DVec3(-90, 0, 0)}; });
+    const int foot = figure.Add(name + "Foot", figure.Add(name + "Leg", thigh, DVec3(42, 0, 0)),
+                                DVec3(41, 0, 0));
+    figure.Add(name + "ToeBase", foot, DVec3(5, 0, 13));
+  }
+  const int spine = figure.Add("Spine", hips, DVec3(20, 0, 0));
+  figure.Animate(spine, [](int) { return Figure::Local{DVec3(0.0), DVec3(90, 0, 0)}; });
+  const int chest = figure.Add("Chest", spine, DVec3(30, 0, 0));
+  for (const double side : {1.0, -1.0}) {
+    const std::string name = side > 0 ? "Left" : "Right";
+    const int arm = figure.Add(name + "Arm", chest, DVec3(0, 0, side * 18));
+    figure.Animate(arm, [](int) { return Figure::Local{DVec3(0.0), DVec3(180, 0, 0)}; });
+    figure.Add(name + "Hand", figure.Add(name + "ForeArm", arm, DVec3(28, 0, 0)), DVec3(12, 0, 0));
+  }
+  const Capture capture = Read(figure.Text());
+  EXPECT_EQ(capture.up, BvhAxis::kPlusY);
+  EXPECT_EQ(capture.up_source, UpSource::kMotion);
+  EXPECT_NEAR(PositionOf(capture, 0, "LeftFoot").y, -0.03, 0.005);
+}
+
 TEST(BvhFigure, FindsLeftAndRightOfLegsThatStartAtTheSamePoint) {
   Figure figure;
   const int hips = figure.Add("Hips", -1, DVec3(0, 90, 0), true);

@@ -322,6 +322,25 @@ TEST(LegFinder, DoesNotTakeHangingArmsForLegs) {
   EXPECT_FALSE(FindLegs(figure.Shape()).has_value());
 }
 
+// A figure that hangs by its arms with drawn-up legs stands in the rest pose.
+TEST(LegFinder, DoesNotTakeArmsThatCarryTheBodyForLegs) {
+  FigureSketch figure;
+  figure.Add("0", -1, Vec3(0.0f));
+  AddLegs(figure, {{"*a", 0.42f}, {"*b", 0.42f}, {"*c", 0.0f}});
+  AddUpperBody(figure);
+  for (int f = 0; f < 5; ++f) {
+    figure.AddPose({{"A2", 3.1},
+                    {"B2", 3.1},
+                    {"Lefta", -1.6},
+                    {"Righta", -1.6},
+                    {"Leftb", 2.6},
+                    {"Rightb", 2.6}});
+  }
+  const Expected<FoundLegs> legs = FindLegs(figure.Shape());
+  ASSERT_TRUE(legs.has_value()) << Describe(legs.error());
+  EXPECT_EQ(figure.LegNames(legs->legs[0]), "Lefta Leftb Leftc ToeLeft");
+}
+
 TEST(LegFinder, RefusesFiguresWithManyLegs) {
   for (const bool named : {false, true}) {
     FigureSketch crab;
