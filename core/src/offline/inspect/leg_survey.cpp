@@ -1,6 +1,7 @@
 #include "offline/inspect/leg_survey.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -13,11 +14,32 @@ namespace {
 // A leg is bent if its knee is further off the line from hip to ankle than this fraction of the
 // thigh, which corresponds to about 20 degrees.
 constexpr float kBent = 0.17f;
-// A foot that points along the line from hip to ankle has no direction.
+// A foot that points along the line from hip to ankle has no direction. That of a foot which points
+// downward, as in a swing, is uncertain: a small tilt turns it far.
 constexpr float kLeastFootPart = 0.5f;
+constexpr float kCertainFootPart = 0.8f;
+
+// Returns the forward direction of the pelvis, from the line between the hips.
+Vec3 PelvisForward(const LegRig& rig, const std::array<LegPose, 2>& legs) {
+  const auto hip = [&](Foot foot) {
+    const auto f = static_cast<std::size_t>(foot);
+    return legs[f].positions_m[static_cast<std::size_t>(rig.side(foot).hip)];
+  };
+  return glm::cross(hip(Foot::kLeft) - hip(Foot::kRight), Vec3(0.0f, 1.0f, 0.0f));
+}
+
+// Returns the angle between two directions in degrees; 0 if one of them has no length.
+double DegreesBetween(const Vec3& a, const Vec3& b) {
+  const float lengths = glm::length(a) * glm::length(b);
+  if (lengths < 1e-6f) return 0.0;
+  const auto cosine = static_cast<double>(glm::dot(a, b) / lengths);
+  return kDegreesPerRadian * std::acos(std::clamp(cosine, -1.0, 1.0));
+}
 
 // Returns the angle between the bend of a knee and the foot, or nothing if one has no direction.
-std::optional<double> KneeDegrees(const LegRig::Side& side, const LegPose& leg) {
+// `forward` is the direction of the pelvis.
+std::optional<double> KneeDegrees(const LegRig::Side& side, const LegPose& leg,
+                                  const Vec3& forward) {
   const Vec3& hip = leg.positions_m[static_cast<std::size_t>(side.hip)];
   const Vec3& knee = leg.positions_m[static_cast<std::size_t>(side.knee)];
   const Vec3& ankle = leg.positions_m[static_cast<std::size_t>(side.ankle)];
@@ -33,8 +55,9 @@ std::optional<double> KneeDegrees(const LegRig::Side& side, const LegPose& leg) 
   if (bend_m < kBent * side.thigh_m || ahead_m < kLeastFootPart * glm::length(foot)) {
     return std::nullopt;
   }
-  const double cosine = static_cast<double>(glm::dot(bend, ahead)) / (bend_m * ahead_m);
-  return kDegreesPerRadian * std::acos(std::clamp(cosine, -1.0, 1.0));
+  const double to_foot_deg = DegreesBetween(bend, ahead);
+  if (ahead_m >= kCertainFootPart * glm::length(foot)) return to_foot_deg;
+  return std::min(to_foot_deg, DegreesBetween(bend, forward - glm::dot(forward, along) * along));
 }
 
 // Heights of the ball and of the lowest point of a sole above level ground.
@@ -68,27 +91,31 @@ void SurveyLegs(const MotionLibrary& library, const Synthesis& synthesis, bool h
                 LegDeviations& deviations) {
   const LegRig& rig = library.leg_rig();
   if (!rig.is_usable) return;
-  LegPose leg;
-  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    const LegRig::Side& side = rig.side(foot);
-    std::vector<double> heights_m;
-    for (int frame = 0; frame < synthesis.clip.frame_count(); ++frame) {
-      const ConstPoseSpan pose = synthesis.clip.frame(frame);
-      EvaluateLeg(library.skeleton(), rig, pose, foot, leg);
-      if (const auto knee_deg = KneeDegrees(side, leg)) {
+  std::array<LegPose, 2> legs;
+  std::array<std::vector<double>, 2> heights_m;
+  for (int frame = 0; frame < synthesis.clip.frame_count(); ++frame) {
+    const ConstPoseSpan pose = synthesis.clip.frame(frame);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      EvaluateLeg(library.skeleton(), rig, pose, foot, legs[static_cast<std::size_t>(foot)]);
+    }
+    const Vec3 forward = PelvisForward(rig, legs);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const auto f = static_cast<std::size_t>(foot);
+      if (const auto knee_deg = KneeDegrees(rig.side(foot), legs[f], forward)) {
         deviations.knee_deg = std::max(deviations.knee_deg.value_or(0.0), *knee_deg);
       }
-      const SoleHeights heights = HeightsOf(side, leg, static_cast<double>(pose.root_position_m.y));
-      heights_m.push_back(has_stand ? heights.lowest_m : heights.ball_m);
+      const SoleHeights heights =
+          HeightsOf(rig.side(foot), legs[f], static_cast<double>(pose.root_position_m.y));
+      heights_m[f].push_back(has_stand ? heights.lowest_m : heights.ball_m);
       deviations.sink_m = std::max(deviations.sink_m, -heights.ball_m);
       ++deviations.feet;
     }
-    for (const MovementRecord& movement : synthesis.movements) {
-      for (const PlantRecord& plant : movement.plants) {
-        if (plant.foot != foot) continue;
-        deviations.hover_m =
-            std::max(deviations.hover_m, HoverOf(plant, heights_m, synthesis.clip.fps, has_stand));
-      }
+  }
+  for (const MovementRecord& movement : synthesis.movements) {
+    for (const PlantRecord& plant : movement.plants) {
+      deviations.hover_m = std::max(deviations.hover_m,
+                                    HoverOf(plant, heights_m[static_cast<std::size_t>(plant.foot)],
+                                            synthesis.clip.fps, has_stand));
     }
   }
 }

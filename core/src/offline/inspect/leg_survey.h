@@ -20,8 +20,9 @@ struct LegDeviations {
 /// Measures knees and soles of a synthesis on level ground at y = 0. Extends `deviations`.
 ///
 /// - The direction of a knee is that from the line between hip and ankle to the knee. It is
-///   compared with that from ankle to ball, both seen along that line. Legs that are bent by less
-///   than about 20 degrees have no direction.
+///   compared with that from ankle to ball, both seen along that line. If the foot points downward,
+///   as in a swing, its direction is uncertain. Then the knee may also follow the pelvis. Legs that
+///   are bent by less than about 20 degrees have no direction.
 /// - Heights are relative to the stand pose. The depth of a sole is measured at the ball of the
 ///   foot. Skeletons have no heel joint, and their toe tips dip several centimetres below the
 ///   ground even in captures.
