@@ -55,7 +55,12 @@ Skeleton SyntheticWalker::MakeSkeleton() const {
   return skeleton;
 }
 
-Capture SyntheticWalker::Render(const std::vector<Instant>& instants) const {
+Capture SyntheticWalker::Render(std::vector<Instant> instants) const {
+  for (Instant& now : instants) {
+    for (DVec3* point : {&now.pelvis_m, &now.ankle_m[0], &now.ankle_m[1]}) {
+      point->y += slope * point->z;
+    }
+  }
   Capture capture;
   capture.path = "synthetic.bvh";
   capture.skeleton = MakeSkeleton();
@@ -133,7 +138,7 @@ Capture SyntheticWalker::Walk(const std::vector<WalkerStep>& steps) const {
     feet[moving] = to;
   }
   hold(stand_s);
-  return Render(instants);
+  return Render(std::move(instants));
 }
 
 Capture SyntheticWalker::Jump(double length_m) const {
@@ -186,13 +191,64 @@ Capture SyntheticWalker::Jump(double length_m) const {
   }
   truth.toe_off_s = {stand_s + kDownS + kPushS};
   truth.heel_strike_s = {stand_s + kDownS + kPushS + kFlightS};
-  return Render(instants);
+  return Render(std::move(instants));
+}
+
+Capture SyntheticWalker::Run(int steps) const {
+  constexpr double kSpeed = 2.7;
+  constexpr double kStanceS = 0.2;
+  constexpr double kFlightS = 0.1;
+  constexpr double kPeriodS = kStanceS + kFlightS;
+  truth = {};
+  std::vector<Instant> instants;
+  const auto frames = static_cast<int>(std::lround(steps * kPeriodS * fps));
+  for (int i = 0; i < frames; ++i) {
+    const double t = i / fps;
+    const double phase = std::fmod(t, kPeriodS);
+    const double air = phase - kStanceS;  // Positive in flight.
+    Instant now;
+    const double bounce =
+        air > 0.0 ? 0.5 * 9.81 * air * (kFlightS - air) : -0.03 * std::sin(kPi * phase / kStanceS);
+    now.pelvis_m = DVec3(0.0, kHipHeightM - 0.06 + bounce, kSpeed * t);
+    for (int f = 0; f < 2; ++f) {
+      // Foot f stands in every second period, below the place of the pelvis in the middle of it.
+      const double own = t - f * kPeriodS;
+      const double stride = std::floor(own / (2.0 * kPeriodS));
+      const double since = own - 2.0 * kPeriodS * stride;
+      const double stance_z = kSpeed * ((2.0 * stride + f) * kPeriodS + 0.5 * kStanceS);
+      const double v = Ease((since - kStanceS) / (2.0 * kPeriodS - kStanceS));
+      now.ankle_m[f] = DVec3(SideOf(f) * kHalfHipsM, kAnkleHeightM + 0.25 * std::sin(kPi * v),
+                             stance_z + 2.0 * kPeriodS * kSpeed * v);
+    }
+    instants.push_back(now);
+  }
+  return Render(std::move(instants));
 }
 
 Capture SyntheticWalker::Stand(double seconds) const {
   SyntheticWalker still = *this;
   still.stand_s = 0.5 * seconds;
   return still.Walk({});
+}
+
+void RemoveTravel(Capture& capture) {
+  for (Vec3& position : capture.clip.root_positions_m) position.z = 0.0f;
+}
+
+void PrependStillPose(int frames, double lower_m, Capture& capture) {
+  const Clip motion = capture.clip;
+  capture.clip.Resize(frames + motion.frame_count(), motion.joint_count);
+  for (int f = 0; f < capture.clip.frame_count(); ++f) {
+    const PoseSpan to = capture.clip.frame(f);
+    const ConstPoseSpan from = motion.frame(std::max(0, f - frames));
+    to.root_position_m = from.root_position_m;
+    if (f < frames) {
+      to.root_position_m.y -= static_cast<float>(lower_m);
+      std::ranges::fill(to.rotations, kIdentityQuat);
+    } else {
+      std::ranges::copy(from.rotations, to.rotations.begin());
+    }
+  }
 }
 
 }  // namespace stridewire

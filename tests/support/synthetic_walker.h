@@ -25,6 +25,7 @@ struct SyntheticWalker {
   double swing_s = 0.5;
   double pelvis_swing_rad = 0.0;  ///< Amplitude of the pelvis yaw, once per stride.
   double leg_scale = 1.0;
+  double slope = 0.0;  ///< Rise of the ground per metre along z, before `heading_rad` is applied.
 
   /// The true contact times of the last generated capture, since its first frame.
   struct Truth {
@@ -38,6 +39,8 @@ struct SyntheticWalker {
   /// Stands, crouches, jumps `length_m` ahead with a flight of 0.4 s, and stands again.
   [[nodiscard]] Capture Jump(double length_m) const;
   [[nodiscard]] Capture Stand(double seconds) const;
+  /// Runs straight ahead at 2.7 m/s, with both feet off the ground for 0.1 s between stances.
+  [[nodiscard]] Capture Run(int steps) const;
 
  private:
   struct Instant {
@@ -45,8 +48,15 @@ struct SyntheticWalker {
     DVec3 ankle_m[2];
     double pelvis_yaw_rad = 0.0;
   };
-  [[nodiscard]] Capture Render(const std::vector<Instant>& instants) const;
+  [[nodiscard]] Capture Render(std::vector<Instant> instants) const;
 };
+
+/// Removes the travel of the root along z, like an export "in place".
+void RemoveTravel(Capture& capture);
+
+/// Puts a still pose before a capture: the joints unrotated, the root at its first position, lowered
+/// by `lower_m`.
+void PrependStillPose(int frames, double lower_m, Capture& capture);
 
 /// Height of the balls of the standing figure above the ground.
 inline constexpr double kWalkerBallHeightM = 0.03;

@@ -131,6 +131,7 @@ int RunBuild(const BuildCommand& command) {
   BuildReport report(command.json);
   AssembleOptions options;
   options.mirror = command.mirror;
+  options.extract.derive_root_motion = command.root_motion;
   options.unsettled_jumps = command.all;
   if (const std::string wrong = ParseKinds(command.kinds, options); !wrong.empty()) {
     return report.Fail(wrong, kExitBadInput);

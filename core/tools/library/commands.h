@@ -13,6 +13,7 @@ struct BuildCommand {
   std::string out;
   std::string kinds = "step,jump";
   bool mirror = false;
+  bool root_motion = false;
   bool all = false;
   double max_pose_error_m = 0.025;
   bool no_self_check = false;

@@ -108,6 +108,9 @@ int Run(int argc, char** argv) {
       ->capture_default_str();
   build_app->add_flag("--mirror", build.mirror,
                       "Also add the mirror image of every step, for the other foot");
+  build_app->add_flag("--root-motion", build.root_motion,
+                      "Derive the root motion of figures that walk on the spot from the foot that "
+                      "stands");
   build_app
       ->add_option("--unit-m", build.unit_m,
                    "Length of one file unit in metres (default: detected)")

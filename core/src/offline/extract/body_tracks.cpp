@@ -11,7 +11,33 @@ namespace {
 
 constexpr double kPelvisSmoothS = 0.06;
 
+// Returns the indices of the joints that belong to neither leg, without the root.
+std::vector<std::size_t> TrunkJoints(const Skeleton& skeleton) {
+  const auto count = static_cast<std::size_t>(skeleton.joint_count());
+  std::vector<char> in_leg(count, 0);
+  for (const Leg& leg : skeleton.legs) in_leg[static_cast<std::size_t>(leg.hip)] = 1;
+  std::vector<std::size_t> joints;
+  for (std::size_t j = 1; j < count; ++j) {
+    const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
+    if (in_leg[parent]) in_leg[j] = 1;
+    if (!in_leg[j]) joints.push_back(j);
+  }
+  return joints;
+}
+
 }  // namespace
+
+double LegLength(const Skeleton& skeleton) {
+  double length = 0.0;
+  for (const Leg& leg : skeleton.legs) {
+    for (int joint = leg.ankle; joint > leg.hip;) {
+      const Joint& bone = skeleton.joints[static_cast<std::size_t>(joint)];
+      length += 0.5 * glm::length(bone.offset_m);
+      joint = bone.parent;
+    }
+  }
+  return length;
+}
 
 std::vector<DVec3> SmoothPath(const std::vector<DVec3>& path, int window) {
   const int reach = window / 2;
@@ -48,6 +74,10 @@ BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame
   const auto count = static_cast<std::size_t>(tracks.frames.size());
   tracks.pelvis_m.reserve(count);
   tracks.pelvis_yaw_rad.reserve(count);
+  tracks.leg_length_m = LegLength(skeleton);
+  const std::vector<std::size_t> trunk = TrunkJoints(skeleton);
+  std::vector<Vec3> positions(static_cast<std::size_t>(skeleton.joint_count()));
+  std::vector<Quat> rotations(positions.size());
   double yaw_rad = 0.0;
   for (int f = tracks.frames.begin; f < tracks.frames.end; ++f) {
     const ConstPoseSpan pose = clip.frame(f);
@@ -59,6 +89,18 @@ BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame
       track.toe_tip_m.emplace_back(PointPosition(skeleton, pose, leg.ball, leg.toe_tip_offset_m));
     }
     tracks.pelvis_m.emplace_back(pose.root_position_m);
+    if (!trunk.empty()) {
+      ForwardKinematics(skeleton, pose, positions, rotations);
+      // Bones count by their length, so that the many joints of the fingers do not prevail.
+      DVec3 sum(0.0);
+      double weight = 0.0;
+      for (const std::size_t joint : trunk) {
+        const double length = glm::length(skeleton.joints[joint].offset_m);
+        sum += length * DVec3(positions[joint]);
+        weight += length;
+      }
+      tracks.trunk_m.push_back(weight > 0.0 ? sum / weight : DVec3(pose.root_position_m));
+    }
     double frame_yaw_rad = yaw_rad;
     HeadingOf(pose.rotations[0], frame_yaw_rad);
     yaw_rad = f == tracks.frames.begin ? frame_yaw_rad : UnwrapAngle(frame_yaw_rad, yaw_rad);

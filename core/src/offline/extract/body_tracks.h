@@ -8,8 +8,9 @@
 
 namespace stridewire {
 
-/// World paths of the points that determine where a figure walks: three points per foot and the
-/// pelvis. All vectors have one value per frame of `frames`; index 0 is frame `frames.begin`.
+/// World paths of the points that determine where a figure walks: three points per foot, the pelvis
+/// and the trunk. All vectors have one value per frame of `frames`; index 0 is frame
+/// `frames.begin`.
 struct BodyTracks {
   struct FootTrajectory {
     std::vector<DVec3> ankle_m;
@@ -23,10 +24,17 @@ struct BodyTracks {
   std::vector<DVec3> pelvis_m;
   std::vector<double> pelvis_speed_m_s;  ///< Speed along the path smoothed over 60 ms.
   std::vector<double> pelvis_yaw_rad;    ///< Unwrapped yaw of the pelvis; positive is left.
+  /// Mean position of the joints that belong to neither leg, weighted by the lengths of their bones.
+  /// Empty if there are none.
+  std::vector<DVec3> trunk_m;
+  double leg_length_m = 0.9;  ///< Length of thigh plus shank, averaged over both legs.
 
   [[nodiscard]] int size() const { return static_cast<int>(pelvis_m.size()); }
   [[nodiscard]] const FootTrajectory& foot(Foot f) const { return feet[static_cast<int>(f)]; }
 };
+
+/// Returns the length of thigh plus shank in metres, averaged over both legs.
+[[nodiscard]] double LegLength(const Skeleton& skeleton);
 
 /// Computes the tracks for frames [first_frame, end) of a clip.
 [[nodiscard]] BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame);

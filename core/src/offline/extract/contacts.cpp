@@ -5,96 +5,119 @@
 
 #include "base/check.h"
 #include "offline/base/statistics.h"
+#include "offline/extract/foot_paths.h"
+#include "offline/extract/foot_rest.h"
+#include "offline/extract/support.h"
 
 namespace stridewire {
 namespace {
 
-// Shorter contacts may be slow moments within swings and jumps.
-constexpr double kLongContactS = 0.3;
-constexpr double kFreeFallM_s2 = -5.0;  // A figure whose pelvis accelerates like this is falling.
-// A ball that moves slower than this belongs to a flat foot.
-constexpr double kBallAtRestM_s = 0.3;
+constexpr double kBallStillMinS = 0.03;  // A ball that rests for less time has no resting height.
+// A figure that has no foot on the ground for less time than this has not jumped.
+constexpr double kFlightMinS = 0.15;
+// A foot that rolls off slowly comes to rest for at most this time.
+constexpr double kRollOffMaxS = 0.2;
 
-using Flags = std::vector<char>;
-
-std::vector<FrameRange> Runs(const Flags& flags) {
-  std::vector<FrameRange> runs;
-  for (int i = 0; i < static_cast<int>(flags.size()); ++i) {
-    if (!flags[static_cast<std::size_t>(i)]) continue;
-    if (runs.empty() || runs.back().end != i) runs.push_back({i, i});
-    runs.back().end = i + 1;
-  }
-  return runs;
-}
-
-std::vector<double> Heights(const std::vector<DVec3>& path) {
-  std::vector<double> heights;
-  heights.reserve(path.size());
-  for (const DVec3& point : path) heights.push_back(point.y);
-  return heights;
-}
-
-// Returns the frames at which any of the three points is slow and, if `use_height`, low. Fills
-// short gaps and drops short contacts.
-std::vector<FrameRange> StandingRuns(const BodyTracks::FootTrajectory& track, double fps,
-                                     bool use_height, const ContactOptions& options) {
-  Flags standing(track.ball_m.size(), 0);
-  const int window = static_cast<int>(std::lround(options.smooth_s * fps));
-  for (const auto* points : {&track.ankle_m, &track.ball_m, &track.toe_tip_m}) {
-    const std::vector<DVec3> path = SmoothPath(*points, window);
-    const std::vector<double> speed = PathSpeed(path, fps);
-    const double low = Percentile(Heights(path), options.resting_percentile) + options.height_max_m;
-    for (std::size_t i = 0; i < path.size(); ++i) {
-      if (speed[i] < options.speed_max_m_s && (!use_height || path[i].y < low)) standing[i] = 1;
-    }
-  }
-  std::vector<FrameRange> merged;
-  for (const FrameRange& run : Runs(standing)) {
-    if (!merged.empty() && (run.begin - merged.back().end) < options.gap_min_s * fps) {
-      merged.back().end = run.end;
-    } else {
-      merged.push_back(run);
-    }
-  }
-  std::erase_if(merged,
-                [&](const FrameRange& r) { return r.size() < options.contact_min_s * fps; });
-  return merged;
-}
-
-// Returns the mean vertical acceleration of the pelvis over some frames, from the second difference
-// of the mean heights of thirds.
-double VerticalAcceleration(const BodyTracks& tracks, const FrameRange& range) {
-  const int third = std::max(1, range.size() / 3);
-  if (range.size() < 3 * third) return 0.0;
-  const auto mean = [&](int begin) {
-    double sum = 0.0;
-    for (int i = begin; i < begin + third; ++i)
-      sum += tracks.pelvis_m[static_cast<std::size_t>(i)].y;
-    return sum / third;
-  };
-  const double dt = third / tracks.fps;
-  return (mean(range.begin) - 2.0 * mean(range.begin + third) + mean(range.begin + 2 * third)) /
-         (dt * dt);
-}
-
-// Returns the lower quartile of the height of the ball while it rests, or over all frames if it
-// never rests.
-double RestingBallHeight(const BodyTracks::FootTrajectory& track,
-                         const std::vector<double>& ball_speed, const FrameRange& frames) {
+// Returns the lower quartile of the height of the ball while it rests. If only the heel touches the
+// ground, as at the end of a recording, the ball of the flat foot would be below the ankle.
+double RestingBallHeight(const FootPaths& foot, const FrameRange& frames, double fps) {
   std::vector<double> still;
-  std::vector<double> all;
+  std::vector<double> ball;
+  std::vector<double> below_ankle;
   for (int i = frames.begin; i < frames.end; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    all.push_back(track.ball_m[k].y);
-    if (ball_speed[k] < kBallAtRestM_s) still.push_back(track.ball_m[k].y);
+    const double height = foot.Height(FootPaths::kBall, i);
+    ball.push_back(height);
+    below_ankle.push_back(foot.Height(FootPaths::kAnkle, i) -
+                          foot.flat_height_m[FootPaths::kAnkle]);
+    if (foot.IsSlower(FootPaths::kBall, i, kAtRestM_s)) still.push_back(height);
   }
-  return Percentile(still.empty() ? std::move(all) : std::move(still), 25.0);
+  if (!still.empty() && static_cast<double>(still.size()) >= kBallStillMinS * fps) {
+    return Percentile(std::move(still), 25.0);
+  }
+  return std::min(Percentile(std::move(ball), 25.0), Percentile(std::move(below_ankle), 25.0));
 }
 
-std::vector<double> BallSpeed(const BodyTracks::FootTrajectory& track, double fps,
-                              const ContactOptions& options) {
-  const int window = static_cast<int>(std::lround(options.smooth_s * fps));
-  return PathSpeed(SmoothPath(track.ball_m, window), fps);
+// Completes the contacts of one foot where the other foot swings, so this foot carries the figure.
+class ContactBridge {
+ public:
+  ContactBridge(const FootPaths& foot, double fps, const ContactOptions& options)
+      : foot_(foot), fps_(fps), speed_max_m_s_(options.speed_max_m_s) {}
+
+  // Extends the contacts as long as the foot stays slow on its place and the other foot swings.
+  void Extend(const std::vector<char>& other_swings, std::vector<Contact>& contacts) const {
+    const int count = static_cast<int>(other_swings.size());
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      FrameRange& frames = contacts[k].frames;
+      const int last = k + 1 < contacts.size() ? contacts[k + 1].frames.begin - 1 : count;
+      const int first = k > 0 ? contacts[k - 1].frames.end + 1 : 0;
+      const int end = frames.end - 1;
+      while (frames.end < last && Carries(frames.end, end, other_swings)) ++frames.end;
+      const int begin = frames.begin;
+      while (frames.begin > first && Carries(frames.begin - 1, begin, other_swings)) {
+        --frames.begin;
+      }
+    }
+  }
+
+  // Joins successive contacts on one place between which the foot stays slow: while the other foot
+  // swings, and if the foot only rolls off.
+  void Join(const std::vector<char>& other_swings, std::vector<Contact>& contacts) const {
+    std::vector<Contact> joined;
+    for (const Contact& contact : contacts) {
+      if (!joined.empty() && AreOne(joined.back().frames, contact.frames, other_swings)) {
+        joined.back().frames.end = contact.frames.end;
+      } else {
+        joined.push_back(contact);
+      }
+    }
+    contacts = std::move(joined);
+  }
+
+ private:
+  [[nodiscard]] bool IsSlow(int frame) const {
+    return foot_.slowest_m_s[static_cast<std::size_t>(frame)] < speed_max_m_s_;
+  }
+
+  [[nodiscard]] bool Carries(int frame, int edge, const std::vector<char>& other_swings) const {
+    return other_swings[static_cast<std::size_t>(frame)] != 0 && IsSlow(frame) &&
+           foot_.OnOnePlace(frame, edge);
+  }
+
+  [[nodiscard]] bool AreOne(const FrameRange& before, const FrameRange& after,
+                            const std::vector<char>& other_swings) const {
+    if (!foot_.OnOnePlace(before.end - 1, after.begin)) return false;
+    bool alone = true;
+    for (int i = before.end; i < after.begin; ++i) {
+      if (!IsSlow(i)) return false;
+      if (!other_swings[static_cast<std::size_t>(i)]) alone = false;
+    }
+    return alone || std::min(before.size(), after.size()) < kRollOffMaxS * fps_;
+  }
+
+  const FootPaths& foot_;
+  double fps_;
+  double speed_max_m_s_;
+};
+
+// Returns one flag per frame: non-zero if the foot `other` does not stand and is fast, or if no foot
+// stands for so short a time that the figure cannot have jumped.
+std::vector<char> OtherSwings(const FootPaths& other_foot, int other, double fps,
+                              const FootContacts& contacts, const ContactOptions& options) {
+  const int count = static_cast<int>(other_foot.slowest_m_s.size());
+  const std::vector<char> stands = StandingFrames(contacts.feet[other], count);
+  const std::vector<char> self_stands = StandingFrames(contacts.feet[1 - other], count);
+  std::vector<char> swings(stands.size());
+  int nobody = 0;  // Successive frames up to this one at which no foot stands.
+  for (int i = 0; i < count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    swings[k] = !stands[k] && other_foot.slowest_m_s[k] >= options.speed_max_m_s;
+    nobody = stands[k] || self_stands[k] ? 0 : nobody + 1;
+    const bool lands = i + 1 < count && (stands[k + 1] || self_stands[k + 1]);
+    if (nobody > 0 && lands && nobody < kFlightMinS * fps) {
+      std::fill_n(swings.begin() + i - nobody + 1, nobody, 1);
+    }
+  }
+  return swings;
 }
 
 }  // namespace
@@ -111,43 +134,32 @@ std::vector<char> StandingFrames(const std::vector<Contact>& contacts, int frame
 void MeasureBallHeights(const BodyTracks& tracks, const ContactOptions& options,
                         FootContacts& contacts) {
   for (int f = 0; f < 2; ++f) {
-    const std::vector<double> speed = BallSpeed(tracks.feet[f], tracks.fps, options);
+    const FootPaths foot = MakeFootPaths(tracks.feet[f], tracks.fps, options.smooth_s);
     for (Contact& contact : contacts.feet[f]) {
       STRIDEWIRE_CHECK(contact.frames.size() > 0 && contact.frames.end <= tracks.size());
-      contact.ball_height_m = RestingBallHeight(tracks.feet[f], speed, contact.frames);
+      contact.ball_height_m = RestingBallHeight(foot, contact.frames, tracks.fps);
     }
   }
 }
 
 FootContacts FindContacts(const BodyTracks& tracks, const ContactOptions& options) {
   STRIDEWIRE_CHECK(tracks.fps > 0.0);
+  const FootPaths feet[2] = {MakeFootPaths(tracks.feet[0], tracks.fps, options.smooth_s),
+                             MakeFootPaths(tracks.feet[1], tracks.fps, options.smooth_s)};
   FootContacts contacts;
-  std::vector<FrameRange> by_speed[2];
-  for (int f = 0; f < 2; ++f) {
-    const BodyTracks::FootTrajectory& track = tracks.feet[f];
-    const std::vector<double> ball_speed = BallSpeed(track, tracks.fps, options);
-    by_speed[f] = StandingRuns(track, tracks.fps, false, options);
-    double lowest = 1e9;
-    double highest = -1e9;
-    for (const FrameRange& run : by_speed[f]) {
-      if (run.size() < kLongContactS * tracks.fps) continue;
-      const double height = RestingBallHeight(track, ball_speed, run);
-      lowest = std::min(lowest, height);
-      highest = std::max(highest, height);
-    }
-    if (highest - lowest > options.raised_floor_m) contacts.single_floor = false;
-  }
-  for (int f = 0; f < 2; ++f) {
-    const BodyTracks::FootTrajectory& track = tracks.feet[f];
-    std::vector<FrameRange> runs = contacts.single_floor
-                                       ? StandingRuns(track, tracks.fps, true, options)
-                                       : std::move(by_speed[f]);
-    for (const FrameRange& run : runs) {
-      if (!contacts.single_floor && run.size() < kLongContactS * tracks.fps &&
-          VerticalAcceleration(tracks, run) < kFreeFallM_s2) {
-        continue;
-      }
-      contacts.feet[f].push_back({run, 0.0});
+  for (int f = 0; f < 2; ++f) contacts.feet[f] = FindRests(feet[f], tracks.fps, options);
+  MeasureBallHeights(tracks, options, contacts);
+  RemoveUnsupported(tracks, options, contacts);
+  // A contact that has become longer may leave only a short gap to a contact of the other foot,
+  // which the second round closes.
+  for (int round = 0; round < 2; ++round) {
+    const std::vector<char> others_swing[2] = {
+        OtherSwings(feet[1], 1, tracks.fps, contacts, options),
+        OtherSwings(feet[0], 0, tracks.fps, contacts, options)};
+    for (int f = 0; f < 2; ++f) {
+      const ContactBridge bridge(feet[f], tracks.fps, options);
+      bridge.Join(others_swing[f], contacts.feet[f]);
+      bridge.Extend(others_swing[f], contacts.feet[f]);
     }
   }
   MeasureBallHeights(tracks, options, contacts);

@@ -9,10 +9,13 @@
 #include "offline/base/text.h"
 #include "offline/capture/glitch_repair.h"
 #include "offline/extract/body_tracks.h"
+#include "offline/extract/explain.h"
 #include "offline/extract/ground.h"
 #include "offline/extract/heading.h"
 #include "offline/extract/normalise.h"
+#include "offline/extract/root_motion.h"
 #include "offline/extract/stand_pose.h"
+#include "offline/extract/still_ends.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {
@@ -24,16 +27,6 @@ constexpr double kJumpStraightMaxRad = 0.35;
 
 double HeadingBetween(const DVec3& from, const DVec3& to) {
   return std::atan2(to.x - from.x, to.z - from.z);
-}
-
-double LegLength(const Skeleton& skeleton) {
-  double length = 0.0;
-  for (const Leg& leg : skeleton.legs) {
-    for (const int joint : {leg.knee, leg.ankle}) {
-      length += 0.5 * glm::length(skeleton.joints[static_cast<std::size_t>(joint)].offset_m);
-    }
-  }
-  return length;
 }
 
 // Extracts the examples of one capture.
@@ -53,14 +46,17 @@ class Extractor {
       out_.error = Describe(valid.error());
       return std::move(out_);
     }
-    const GlitchReport glitches = RepairGlitches(capture_.skeleton, capture_.first_frame, clip_);
+    SetAsideStillEnds();
+    const GlitchReport glitches = RepairGlitches(capture_.skeleton, first_frame_, clip_);
     flips_left_ = glitches.left;
     for (std::string& sentence : DescribeRepairs(capture_.skeleton, glitches, clip_.fps)) {
       out_.notes.push_back(std::move(sentence));
     }
-    tracks_ = TrackBody(capture_.skeleton, clip_, capture_.first_frame);
+    tracks_ = TrackBody(capture_.skeleton, clip_, first_frame_);
+    const bool is_walk_on_the_spot = HandleWalkOnTheSpot();
     contacts_ = FindContacts(tracks_, options_.contacts);
-    Segmentation segments = Segment(tracks_, contacts_, options_.segments);
+    Segmentation segments;
+    if (!is_walk_on_the_spot) segments = Segment(tracks_, contacts_, options_.segments);
     heading_rad_ = StrideHeading(tracks_, contacts_);
     STRIDEWIRE_CHECK(heading_rad_.size() == static_cast<std::size_t>(tracks_.size()));
     if (options_.target != nullptr) Retarget();
@@ -70,6 +66,9 @@ class Extractor {
     for (RejectedSpan& span : segments.rejected) Reject(span.frames, std::move(span.reason));
     for (const StepSegment& step : segments.steps) AddStep(step);
     for (const JumpSegment& jump : segments.jumps) AddJump(jump);
+    if (out_.steps_left + out_.steps_right + out_.jumps == 0 && !is_walk_on_the_spot) {
+      out_.no_movement_reason = ExplainNoMovement(tracks_, contacts_, !out_.rejected.empty());
+    }
     std::ranges::sort(out_.rejected, {}, &RejectedTime::from_s);
     out_.stand = FindStand(out_.skeleton, clip_, tracks_, contacts_, ground_, heading_rad_);
     return std::move(out_);
@@ -89,12 +88,50 @@ class Extractor {
     return clip_.Validate();
   }
 
+  // Leaves out still poses at the ends that are not connected to the motion.
+  void SetAsideStillEnds() {
+    const FrameRange all{capture_.first_frame, clip_.frame_count()};
+    const FrameRange frames = WithoutStillEnds(capture_.skeleton, clip_, capture_.first_frame);
+    first_frame_ = frames.begin;
+    if (frames.begin > all.begin) {
+      out_.notes.push_back(
+          Text("the first %d frames (%.2f s) hold a still pose that jumps to the motion: left out",
+               frames.begin - all.begin, (frames.begin - all.begin) / clip_.fps));
+    }
+    if (frames.end < all.end) {
+      out_.notes.push_back(
+          Text("the last %d frames (%.2f s) hold a still pose to which the motion jumps: left out",
+               all.end - frames.end, (all.end - frames.end) / clip_.fps));
+      clip_.Resize(frames.end, clip_.joint_count);
+    }
+  }
+
+  // Derives the root motion of a figure that walks on the spot, or rejects the capture and returns
+  // true.
+  bool HandleWalkOnTheSpot() {
+    const GroundTravel travel = MeasureGroundTravel(tracks_);
+    if (!WalksOnTheSpot(tracks_, travel)) return false;
+    if (!options_.derive_root_motion) {
+      Reject({0, tracks_.size()},
+             "walks on the spot: the feet slide backward along the ground while the pelvis stays "
+             "in place. Export the animation with root motion, or use --root-motion to derive it "
+             "from the standing foot");
+      return true;
+    }
+    AddRootMotion(travel, first_frame_, clip_);
+    tracks_ = TrackBody(capture_.skeleton, clip_, first_frame_);
+    out_.notes.push_back(
+        Text("walks on the spot: root motion of %.2f m is derived from the standing foot",
+             HorizontalDistance(travel.position_m.front(), travel.position_m.back())));
+    return false;
+  }
+
   // Repeats all measurements on a figure with other bone lengths.
   void Retarget() {
     const double own = LegLength(capture_.skeleton);
     const double scale = own > 0.0 ? LegLength(out_.skeleton) / own : 1.0;
     for (Vec3& position : clip_.root_positions_m) position *= static_cast<float>(scale);
-    tracks_ = TrackBody(out_.skeleton, clip_, capture_.first_frame);
+    tracks_ = TrackBody(out_.skeleton, clip_, first_frame_);
     STRIDEWIRE_CHECK(heading_rad_.size() == static_cast<std::size_t>(tracks_.size()));
     MeasureBallHeights(tracks_, options_.contacts, contacts_);
   }
@@ -283,6 +320,7 @@ class Extractor {
   const Capture& capture_;
   const ExtractOptions& options_;
   Clip clip_;
+  int first_frame_ = 0;
   Extraction out_;
   std::vector<JointFlip> flips_left_;
   BodyTracks tracks_;

@@ -26,6 +26,9 @@ struct ExtractOptions {
   /// If the root moves farther than this, its direction determines the heading more accurately than
   /// the pelvis.
   double displacement_heading_min_m = 0.2;
+  /// If true, a figure that walks on the spot is moved such that its supporting foot stands still.
+  /// Otherwise such captures are rejected.
+  bool derive_root_motion = false;
   /// Skeleton of the examples, with the same joint tree as the capture. If null, examples get the
   /// skeleton of the capture. If bone lengths differ, contacts and segments are still detected on
   /// the capture's own figure. Then the path of the root is scaled by the ratio of leg lengths and
@@ -58,8 +61,12 @@ struct Extraction {
   int steps_right = 0;
   int jumps = 0;
   std::vector<RejectedTime> rejected;
-  std::vector<std::string> notes;  ///< Notes of the reader, and repaired joint flips.
-  std::string error;               ///< Non-empty: the whole capture is not usable.
+  /// Notes of the reader, repaired joint flips, and frames that are left out.
+  std::vector<std::string> notes;
+  /// If the capture contains no step and no jump, why and what to do about it. Empty if the reasons
+  /// in `rejected` are all there is to say.
+  std::string no_movement_reason;
+  std::string error;  ///< Non-empty: the whole capture is not usable.
 
   Skeleton skeleton;  ///< Skeleton of the examples.
   /// Straight steps with the parameters start_z and end_z. Their heading change is 0.
@@ -97,7 +104,7 @@ inline constexpr ParameterName kJumpParameters[] = {ParameterName::kLength, Para
 /// not veer.
 ///
 /// Never fails: `rejected` lists unusable time spans, and `error` is set if the capture is
-/// unusable.
+/// unusable. If nothing is found, `rejected` or `no_movement_reason` says why.
 [[nodiscard]] Extraction Extract(const Capture& capture, const ExtractOptions& options = {});
 
 }  // namespace stridewire

@@ -8,46 +8,70 @@
 namespace stridewire {
 namespace {
 
-constexpr double kFloorBandM =
-    0.06;  // Feet at most this much above the lowest ones stand on the floor.
-constexpr double kFeetDifferMaxM = 0.03;
-constexpr double kTiltMaxM = 0.015;
+constexpr double kFeetDifferMaxM = 0.03;  // Markers may be displaced by this much between feet.
 constexpr double kBallUsualM = 0.04;
 constexpr double kBallPlausibleMinM = 0.01;
 constexpr double kBallPlausibleMaxM = 0.09;
+// Contacts on one piece of level ground differ by at most this.
+constexpr double kLevelBandM = 0.03;
+constexpr double kLevelShareMin = 0.2;  // A level counts if it has this share of the contacts.
+// This deviation from the usual height outweighs all contacts.
+constexpr double kDeviationM = 0.06;
+
+// Returns how much higher the right ball rests than the left one: the median over all pairs of
+// contacts that overlap in time and are on the same level.
+double RightAboveLeft(const FootContacts& contacts) {
+  std::vector<double> differences;
+  for (const Contact& left : contacts.feet[0]) {
+    for (const Contact& right : contacts.feet[1]) {
+      const double difference = right.ball_height_m - left.ball_height_m;
+      if (left.frames.Overlaps(right.frames) && std::fabs(difference) < kFeetDifferMaxM) {
+        differences.push_back(difference);
+      }
+    }
+  }
+  return Median(std::move(differences));
+}
+
+// Returns the height of balls on the level that is closest to y = 0 and has many contacts, or the
+// usual height if no level is near y = 0.
+double BallHeight(std::vector<double> heights) {
+  std::ranges::sort(heights);
+  const auto count = static_cast<double>(heights.size());
+  double best = kBallUsualM;
+  double best_score = -1e9;
+  for (auto first = heights.begin(); first != heights.end(); ++first) {
+    const auto last = std::upper_bound(first, heights.end(), *first + kLevelBandM);
+    const double share = static_cast<double>(last - first) / count;
+    const double height = Median({first, last});
+    if (share < kLevelShareMin || height < kBallPlausibleMinM || height > kBallPlausibleMaxM) {
+      continue;
+    }
+    const double score = share - std::fabs(height - kBallUsualM) / kDeviationM;
+    if (score > best_score) {
+      best_score = score;
+      best = height;
+    }
+  }
+  return best;
+}
 
 }  // namespace
 
-double Ground::Below(Foot foot, double ball_height_in_capture_m) const {
-  const double rise = ball_height_in_capture_m - floor_m - ball_height_m[static_cast<int>(foot)];
-  return floor_m + (single_floor ? std::clamp(rise, -kTiltMaxM, kTiltMaxM) : rise);
-}
-
 Ground FindGround(const FootContacts& contacts) {
   Ground ground;
-  ground.single_floor = contacts.single_floor;
-  double resting[2] = {0.0, 0.0};
-  bool found[2] = {false, false};
+  const double half_difference = 0.5 * RightAboveLeft(contacts);
+  const double offset[2] = {-half_difference, half_difference};
+  std::vector<double> heights;
   for (int f = 0; f < 2; ++f) {
-    std::vector<double> heights;
-    for (const Contact& contact : contacts.feet[f]) heights.push_back(contact.ball_height_m);
-    if (heights.empty()) continue;
-    const double band = Percentile(heights, 5.0) + kFloorBandM;
-    if (!contacts.single_floor) std::erase_if(heights, [&](double h) { return h > band; });
-    resting[f] = Median(std::move(heights));
-    found[f] = true;
+    for (const Contact& contact : contacts.feet[f]) {
+      heights.push_back(contact.ball_height_m - offset[f]);
+    }
   }
-  if (!found[0] && !found[1]) return ground;
+  if (heights.empty()) return ground;
   ground.has_contacts = true;
-  if (!found[0]) resting[0] = resting[1];
-  if (!found[1]) resting[1] = resting[0];
-  if (!contacts.single_floor && std::fabs(resting[0] - resting[1]) > kFeetDifferMaxM) {
-    // The feet never stood on the same level, so their resting heights cannot be distinguished.
-    resting[0] = resting[1] = std::min(resting[0], resting[1]);
-  }
-  const double mean = 0.5 * (resting[0] + resting[1]);
-  if (mean < kBallPlausibleMinM || mean > kBallPlausibleMaxM) ground.floor_m = mean - kBallUsualM;
-  for (int f = 0; f < 2; ++f) ground.ball_height_m[f] = resting[f] - ground.floor_m;
+  const double mean = BallHeight(std::move(heights));
+  for (int f = 0; f < 2; ++f) ground.ball_height_m[f] = mean + offset[f];
   return ground;
 }
 

@@ -7,6 +7,7 @@
 #include "offline/base/horizontal_distance.h"
 #include "offline/base/statistics.h"
 #include "offline/base/text.h"
+#include "offline/extract/posture.h"
 #include "offline/extract/segment_jumps.h"
 
 namespace stridewire {
@@ -84,10 +85,15 @@ class StepFinder {
 
   // Fills `step` and returns an empty string, or returns the reason why the swing is not a step.
   std::string Find(const Swing& swing, StepSegment& step) const {
-    if (swing.fixed == nullptr) return "no foot stands during the whole swing";
+    if (swing.fixed == nullptr) return "the other foot does not stand during the whole swing";
     const double seconds = swing.frames.size() / tracks_.fps;
     if (seconds < options_.swing_min_s) return Text("the foot is lifted for only %.2f s", seconds);
-    if (seconds > options_.swing_max_s) return Text("the foot is lifted for %.1f s", seconds);
+    if (seconds > options_.swing_max_s) {
+      return Text(
+          "the foot is lifted for %.1f s, which is too long for a step; if this is slow "
+          "motion, set --fps",
+          seconds);
+    }
     const BodyTracks::FootTrajectory& moving = tracks_.foot(swing.moving);
     const BodyTracks::FootTrajectory& fixed = tracks_.foot(OtherFoot(swing.moving));
     step.moving = swing.moving;
@@ -97,11 +103,11 @@ class StepFinder {
         Half(swing.frames.begin - swing.SupportBegin(), swing.SupportBegin() == 0);
     const int half_after =
         Half(swing.SupportEnd() - swing.frames.end, swing.SupportEnd() == tracks_.size());
-    if (half_before < 1) return "the recording or the support begins too late";
-    if (half_after < 1) return "the recording or the support ends too early";
+    if (half_before < 1) return "the recording begins in mid-stride, without both feet standing";
+    if (half_after < 1) return "the recording ends in mid-stride, without both feet standing";
     step.start = std::max(0, step.toe_off - half_before);
     step.end = std::min(step.heel_strike + half_after, tracks_.size() - 1);
-    if (step.end <= step.heel_strike) return "the recording ends too early";
+    if (step.end <= step.heel_strike) return "the recording ends when the foot lands";
     const auto at = [](const std::vector<DVec3>& path, int i) {
       return path[static_cast<std::size_t>(i)];
     };
@@ -110,6 +116,9 @@ class StepFinder {
         std::fabs(WrapAngle(FootYaw(moving, step.end) - FootYaw(moving, step.start)));
     if (moved < options_.moved_min_m && turned < options_.turned_min_rad) {
       return Text("the foot lands only %.2f m from its start", moved);
+    }
+    if (LiesOrCrawls(tracks_, (step.toe_off + step.heel_strike) / 2)) {
+      return "the figure lies or crawls";
     }
     double slide = 0.0;
     for (int i = step.toe_off; i < step.heel_strike; ++i) {

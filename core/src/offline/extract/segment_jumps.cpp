@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "offline/base/horizontal_distance.h"
 #include "offline/base/text.h"
 
 // pelvis height      ____                 .-.
@@ -22,16 +23,30 @@ namespace {
 constexpr double kFallMin_m_s2 = -15.0;
 constexpr double kFallMax_m_s2 = -5.0;
 constexpr double kGravity_m_s2 = -9.81;
-constexpr double kGravityDoubt_m_s2 = 1.5;
+// A wrong frame rate is the likely cause if the pelvis follows a parabola of at least this height,
+// with deviations below this share of it.
+constexpr double kArchMinM = 0.02;
+constexpr double kArchResidualShare = 0.05;
+constexpr double kHangMax_m_s = 1.5;  // A figure that hangs on something swings at most this fast.
+// A runner moves at least this fast and is in the air for at least this time.
+constexpr double kRunMin_m_s = 1.0;
+constexpr double kRunFlightMinS = 0.04;
+constexpr double kRunFeetApartS = 0.1;  // The feet of a runner leave the ground this much apart.
 constexpr double kPastLowestM = 0.03;   // The lowest point is past if the pelvis rose this much.
 constexpr double kNextCrouchM = 0.05;   // The next crouch has begun if it sank this much again.
 constexpr double kUprightShare = 0.6;   // The figure stands if this share of the crouch is undone.
 constexpr double kNearlyStill = 2.5;    // Largest speed of a standing figure, times still_m_s.
 constexpr double kUnsettledMinS = 0.1;  // Shortest usable support after landing.
 
-double FlightAcceleration(const BodyTracks& tracks, const FrameRange& flight) {
+// A parabola through the heights of the pelvis.
+struct Fall {
+  double acceleration_m_s2 = 0.0;
+  double residual_m = 0.0;  // Root of the mean squared deviation from the parabola.
+};
+
+Fall FitFall(const BodyTracks& tracks, const FrameRange& flight) {
   const int n = flight.size();
-  if (n < 4) return 0.0;
+  if (n < 4) return {};
   Eigen::MatrixXd a(n, 3);
   Eigen::VectorXd y(n);
   for (int i = 0; i < n; ++i) {
@@ -39,7 +54,27 @@ double FlightAcceleration(const BodyTracks& tracks, const FrameRange& flight) {
     a.row(i) << 1.0, t, t * t;
     y(i) = tracks.pelvis_m[static_cast<std::size_t>(flight.begin + i)].y;
   }
-  return 2.0 * a.colPivHouseholderQr().solve(y)(2);
+  const Eigen::VectorXd fit = a.colPivHouseholderQr().solve(y);
+  return {2.0 * fit(2), (a * fit - y).norm() / std::sqrt(static_cast<double>(n))};
+}
+
+// Returns a usual frame rate if one is within 3 % of the measured rate, otherwise the rounded rate.
+double PlausibleRate(double fps) {
+  for (const double usual : {24.0, 25.0, 30.0, 50.0, 60.0, 90.0, 100.0, 120.0, 200.0, 240.0}) {
+    if (std::fabs(fps - usual) < 0.03 * usual) return usual;
+  }
+  return std::round(fps);
+}
+
+// Returns the mean horizontal speed of the pelvis.
+double TravelSpeed(const BodyTracks& tracks, const FrameRange& flight) {
+  const DVec3& from = tracks.pelvis_m[static_cast<std::size_t>(flight.begin)];
+  const DVec3& to = tracks.pelvis_m[static_cast<std::size_t>(flight.end)];
+  return HorizontalDistance(from, to) * tracks.fps / flight.size();
+}
+
+bool IsFreeFall(double acceleration_m_s2) {
+  return acceleration_m_s2 >= kFallMin_m_s2 && acceleration_m_s2 <= kFallMax_m_s2;
 }
 
 struct Standing {
@@ -88,6 +123,30 @@ Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int las
   return standing;
 }
 
+// Describes a flight in which the pelvis does not fall with 9.81 m/s^2.
+JumpFinding WrongFall(const Fall& fall, const FrameRange& flight, const BodyTracks& tracks) {
+  const double seconds = flight.size() / tracks.fps;
+  const double fall_m_s2 = -fall.acceleration_m_s2;
+  const double arch_m = fall_m_s2 * seconds * seconds / 8.0;
+  if (arch_m > kArchMinM && fall.residual_m < kArchResidualShare * arch_m) {
+    const double rate = PlausibleRate(tracks.fps * std::sqrt(-kGravity_m_s2 / fall_m_s2));
+    return {{},
+            Text("falls at about %.*f m/s^2 instead of 9.81, as if recorded at about %.0f frames "
+                 "per second (the file says %.0f): set --fps %.0f",
+                 fall_m_s2 < 3.0 ? 1 : 0, fall_m_s2, rate, tracks.fps, rate)};
+  }
+  if (TravelSpeed(tracks, flight) > kHangMax_m_s) {
+    return {{},
+            Text("no foot stands still for %.2f s, but the figure does not fall either "
+                 "(%.1f m/s^2): the feet slide",
+                 seconds, fall.acceleration_m_s2)};
+  }
+  return {{},
+          Text("both feet off the ground but not falling (%.1f m/s^2): something holds the figure",
+               fall.acceleration_m_s2),
+          true};
+}
+
 }  // namespace
 
 std::vector<FrameRange> FlightRanges(const BodyTracks& tracks, const FootContacts& contacts) {
@@ -105,29 +164,39 @@ std::vector<FrameRange> FlightRanges(const BodyTracks& tracks, const FootContact
   return flights;
 }
 
+bool FallsFreely(const BodyTracks& tracks, const FrameRange& flight) {
+  return IsFreeFall(FitFall(tracks, flight).acceleration_m_s2);
+}
+
+bool IsRun(const BodyTracks& tracks, const FootContacts& contacts, const FrameRange& flight) {
+  if (flight.size() < kRunFlightMinS * tracks.fps) return false;
+  if (TravelSpeed(tracks, flight) < kRunMin_m_s) return false;
+  // A foot takes part in the take-off if it stands shortly before the flight.
+  const double apart = kRunFeetApartS * tracks.fps;
+  bool takes_off[2] = {false, false};
+  bool lands[2] = {false, false};
+  for (int f = 0; f < 2; ++f) {
+    for (const Contact& contact : contacts.feet[f]) {
+      const FrameRange& frames = contact.frames;
+      if (frames.end <= flight.begin && flight.begin - frames.end < apart) takes_off[f] = true;
+      if (frames.begin >= flight.end && frames.begin - flight.end < apart) lands[f] = true;
+    }
+  }
+  return takes_off[0] != takes_off[1] && lands[0] != lands[1] && takes_off[0] != lands[0];
+}
+
 JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
                      const FrameRange& flight, const SegmentOptions& options) {
   STRIDEWIRE_CHECK(flight.begin > 0 && flight.size() > 0 && flight.end < tracks.size());
   const double seconds = flight.size() / tracks.fps;
+  if (IsRun(tracks, contacts, flight)) {
+    return {{}, Text("this is a run: both feet off the ground for %.2f s", seconds)};
+  }
   if (seconds < options.flight_min_s) {
     return {{}, Text("both feet off the ground for %.2f s", seconds)};
   }
-  const double acceleration = FlightAcceleration(tracks, flight);
-  if (acceleration < kFallMin_m_s2 || acceleration > kFallMax_m_s2) {
-    for (const double factor : {2.0, 4.0}) {
-      const double true_acceleration = acceleration * factor * factor;
-      if (std::fabs(true_acceleration - kGravity_m_s2) < kGravityDoubt_m_s2) {
-        return {{},
-                Text("both feet off the ground, falling as if recorded at %.0f frames/s",
-                     factor * tracks.fps)};
-      }
-    }
-    return {
-        {},
-        Text("both feet off the ground but not falling (%.1f m/s^2): something holds the figure",
-             acceleration),
-        true};
-  }
+  const Fall fall = FitFall(tracks, flight);
+  if (!IsFreeFall(fall.acceleration_m_s2)) return WrongFall(fall, flight, tracks);
   if (seconds > options.flight_max_s) return {{}, Text("in the air for %.1f s", seconds)};
   // Both feet must leave the ground together and land together.
   JumpSegment jump;
@@ -143,10 +212,10 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
     }
     const double apart = options.feet_apart_max_s * tracks.fps;
     if (before == nullptr || flight.begin - before->frames.end > apart) {
-      return {{}, "the feet do not leave the ground together"};
+      return {{}, "a leap from one foot: the feet do not leave the ground together"};
     }
     if (after == nullptr || after->frames.begin - flight.end > apart) {
-      return {{}, "the feet do not land together"};
+      return {{}, "a leap to one foot: the feet do not land together"};
     }
     support_begin = std::max(support_begin, before->frames.begin);
     support_end = std::min(support_end, after->frames.end);

@@ -12,6 +12,14 @@ namespace stridewire {
 [[nodiscard]] std::vector<FrameRange> FlightRanges(const BodyTracks& tracks,
                                                    const FootContacts& contacts);
 
+/// Returns true if the pelvis falls freely during a flight, at 5 to 15 m/s^2.
+[[nodiscard]] bool FallsFreely(const BodyTracks& tracks, const FrameRange& flight);
+
+/// Returns true if a flight is part of a run: the figure travels, takes off from one foot and lands
+/// on the other.
+[[nodiscard]] bool IsRun(const BodyTracks& tracks, const FootContacts& contacts,
+                         const FrameRange& flight);
+
 /// The standing jump around a flight, or the reason why there is none.
 struct JumpFinding {
   std::optional<JumpSegment> jump;

@@ -41,23 +41,8 @@ std::string ReasonForNoMovements(const Extraction& extraction, bool steps, bool 
         "to --kinds",
         extraction.jumps);
   }
-  if (const std::string main = MainReason(extraction); !main.empty()) {
-    return "no usable step or jump; most of the rejected time: " + main;
-  }
-  if (extraction.frames <= 1) {
-    return "the file has a single frame, so nothing moves; record whole walks or jumps";
-  }
-  const double duration_s = extraction.fps > 0.0 ? extraction.frames / extraction.fps : 0.0;
-  if (!extraction.has_contacts) {
-    return Text(
-        "no foot stands still on the ground in %.1f s; check the frame rate (--fps) and "
-        "the up axis (--up)",
-        duration_s);
-  }
-  return Text(
-      "no foot leaves the ground and lands again between two moments with both feet on the "
-      "ground in %.1f s; record walks from a stand to a stand",
-      duration_s);
+  if (!extraction.no_movement_reason.empty()) return extraction.no_movement_reason;
+  return "no usable step or jump; most of the rejected time: " + MainReason(extraction);
 }
 
 }  // namespace stridewire

@@ -48,7 +48,6 @@ TEST(FindContacts, SplitsContactsAtASwing) {
   BodyTracks tracks = StandingTracks(240);
   Move(tracks.feet[0], Swing(100, 150, 0.1));
   const FootContacts contacts = FindContacts(tracks);
-  EXPECT_TRUE(contacts.single_floor);
   ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
   EXPECT_EQ(contacts.foot(Foot::kLeft)[0].frames.begin, 0);
   EXPECT_NEAR(contacts.foot(Foot::kLeft)[0].frames.end, 100, 3);
@@ -81,22 +80,87 @@ TEST(FindContacts, IgnoresSlowRaisedFeetOnASingleFloor) {
     return DVec3(0.0, 0.2 * ramp, 0.0);
   });
   const FootContacts contacts = FindContacts(tracks);
-  EXPECT_TRUE(contacts.single_floor);
   ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
 }
 
+// Moves the pelvis ahead by `ahead_m` during [begin, end).
+void MovePelvis(BodyTracks& tracks, int begin, int end, double ahead_m) {
+  for (int i = 0; i < tracks.size(); ++i) {
+    const double u = std::clamp(static_cast<double>(i - begin) / (end - begin), 0.0, 1.0);
+    tracks.pelvis_m[static_cast<std::size_t>(i)].z += ahead_m * u;
+  }
+}
+
 TEST(FindContacts, IgnoresTheHeightOnBlocks) {
-  // The foot steps onto a block of 30 cm and stays there.
+  // The foot steps onto a block of 30 cm and stays there, and the figure shifts its weight to it.
   BodyTracks tracks = StandingTracks(360);
+  MovePelvis(tracks, 100, 200, 0.35);
   Move(tracks.feet[0], [](int i) {
     const double u = std::clamp((i - 100) / 40.0, 0.0, 1.0);
     return DVec3(0.0, 0.3 * u, 0.4 * u);
   });
   const FootContacts contacts = FindContacts(tracks);
-  EXPECT_FALSE(contacts.single_floor);
   ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
   EXPECT_NEAR(contacts.foot(Foot::kLeft)[1].frames.begin, 140, 4);
   EXPECT_NEAR(contacts.foot(Foot::kLeft)[1].ball_height_m, 0.34, 1e-6);
+}
+
+TEST(FindContacts, IgnoresAFootThatHovers) {
+  // The figure stands on its right foot, with the left one still in the air for two seconds.
+  for (const double lift : {0.08, 0.15, 0.4}) {
+    for (const double ahead : {0.0, 0.3}) {
+      BodyTracks tracks = StandingTracks(480);
+      Move(tracks.feet[0], [&](int i) {
+        const double ramp = std::clamp(std::min((i - 100) / 12.0, (380 - i) / 12.0), 0.0, 1.0);
+        return DVec3(0.0, lift * ramp, ahead * ramp);
+      });
+      const FootContacts contacts = FindContacts(tracks);
+      ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u) << lift << " " << ahead;
+      EXPECT_NEAR(contacts.foot(Foot::kLeft)[0].frames.end, 106, 8) << lift;
+      EXPECT_NEAR(contacts.foot(Foot::kLeft)[1].frames.begin, 374, 8) << lift;
+      EXPECT_EQ(contacts.foot(Foot::kRight).size(), 1u) << lift;
+    }
+  }
+}
+
+TEST(FindContacts, IgnoresFeetThatHangInTheAir) {
+  // Both feet rise at a constant speed, hang still 40 cm above the ground and sink again.
+  BodyTracks tracks = StandingTracks(480);
+  const auto rise = [](int i) {
+    const double ramp = std::clamp(std::min((i - 100) / 40.0, (380 - i) / 40.0), 0.0, 1.0);
+    return DVec3(0.0, 0.4 * ramp, 0.0);
+  };
+  for (BodyTracks::FootTrajectory& foot : tracks.feet) Move(foot, rise);
+  for (int i = 0; i < tracks.size(); ++i) tracks.pelvis_m[static_cast<std::size_t>(i)] += rise(i);
+  const FootContacts contacts = FindContacts(tracks);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    ASSERT_EQ(contacts.foot(foot).size(), 2u);
+    EXPECT_NEAR(contacts.foot(foot)[0].frames.end, 103, 6);
+    EXPECT_NEAR(contacts.foot(foot)[1].frames.begin, 377, 6);
+  }
+}
+
+TEST(FindContacts, IgnoresFeetBesideOrAboveThePelvis) {
+  BodyTracks tracks = StandingTracks(240);
+  for (DVec3& pelvis : tracks.pelvis_m) pelvis.y = 0.15;
+  const FootContacts contacts = FindContacts(tracks);
+  EXPECT_TRUE(contacts.foot(Foot::kLeft).empty());
+  EXPECT_TRUE(contacts.foot(Foot::kRight).empty());
+}
+
+TEST(FindContacts, KeepsAFootThatTheGroundLifts) {
+  // The left foot swings while the ground lifts the right one by 10 cm.
+  BodyTracks tracks = StandingTracks(240);
+  Move(tracks.feet[0], Swing(100, 150, 0.1));
+  const auto lift = [](int i) {
+    return DVec3(0.0, 0.1 * std::clamp((i - 105) / 40.0, 0.0, 1.0), 0.0);
+  };
+  for (BodyTracks::FootTrajectory& foot : tracks.feet) Move(foot, lift);
+  for (int i = 0; i < tracks.size(); ++i) tracks.pelvis_m[static_cast<std::size_t>(i)] += lift(i);
+  const FootContacts contacts = FindContacts(tracks);
+  ASSERT_EQ(contacts.foot(Foot::kRight).size(), 1u);
+  EXPECT_EQ(contacts.foot(Foot::kRight)[0].frames, (FrameRange{0, 240}));
+  EXPECT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
 }
 
 TEST(FindContacts, FillsShortGapsAndDropsShortContacts) {

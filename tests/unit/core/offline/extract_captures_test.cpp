@@ -63,7 +63,8 @@ TEST(ExtractCaptures, RejectsHangingIn01_03) {
   const auto held = std::ranges::count_if(extraction.rejected, [](const RejectedTime& span) {
     return span.reason.find("not falling") != std::string::npos;
   });
-  EXPECT_EQ(held, 4);
+  // Each time, the feet slow down in the air once, which is not a contact.
+  EXPECT_EQ(held, 2);
 }
 
 TEST(ExtractCaptures, FindsTheStepsAndJumpsOfSubject16) {
@@ -180,7 +181,7 @@ TEST(ExtractCaptures, HandlesFilesOfOtherPrograms) {
   const Extraction slow = ExtractFile(other / "amc2bvh/16_02.bvh");
   EXPECT_EQ(slow.jumps, 0);
   ASSERT_EQ(slow.rejected.size(), 1u);
-  EXPECT_THAT(slow.rejected[0].reason, ::testing::HasSubstr("120 frames/s"));
+  EXPECT_THAT(slow.rejected[0].reason, ::testing::HasSubstr("120 frames per second"));
   BvhReadOptions options;
   options.fps = 120.0;
   const Expected<Capture> right_speed = ReadBvh(other / "amc2bvh/16_02.bvh", options);

@@ -1,0 +1,67 @@
+#include "offline/extract/still_ends.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "stridewire/runtime/pose.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kStillM = 0.005;    // No joint of a still pose moves farther in one frame.
+constexpr double kJumpM = 0.05;      // A joint jumps at least this far,
+constexpr double kJumpFactor = 4.0;  // and this many times farther than in the next frame.
+
+class PoseSteps {
+ public:
+  PoseSteps(const Skeleton& skeleton, const Clip& clip)
+      : skeleton_(skeleton),
+        clip_(clip),
+        from_(static_cast<std::size_t>(skeleton.joint_count())),
+        to_(from_.size()),
+        rotations_(from_.size()) {}
+
+  // Returns the largest distance that a joint moves between two frames.
+  double Between(int from, int to) {
+    ForwardKinematics(skeleton_, clip_.frame(from), from_, rotations_);
+    ForwardKinematics(skeleton_, clip_.frame(to), to_, rotations_);
+    double most = 0.0;
+    for (std::size_t j = 0; j < from_.size(); ++j) {
+      most = std::max(most, static_cast<double>(glm::length(to_[j] - from_[j])));
+    }
+    return most;
+  }
+
+ private:
+  const Skeleton& skeleton_;
+  const Clip& clip_;
+  std::vector<Vec3> from_;
+  std::vector<Vec3> to_;
+  std::vector<Quat> rotations_;
+};
+
+// Returns the first frame after the jump that ends a still pose at `begin`, or `begin` if there is
+// no such jump before `end`. With direction -1, frames are counted backward.
+int SkipStillPose(PoseSteps& steps, int begin, int end, int direction) {
+  for (int i = begin; i != end && i + direction != end && i + 2 * direction != end;
+       i += direction) {
+    const double step = steps.Between(i, i + direction);
+    if (step < kStillM) continue;
+    const double next = steps.Between(i + direction, i + 2 * direction);
+    return step > kJumpM && step > kJumpFactor * next ? i + direction : begin;
+  }
+  return begin;
+}
+
+}  // namespace
+
+FrameRange WithoutStillEnds(const Skeleton& skeleton, const Clip& clip, int first_frame) {
+  PoseSteps steps(skeleton, clip);
+  FrameRange frames{first_frame, clip.frame_count()};
+  if (frames.size() < 1) return frames;
+  frames.begin = SkipStillPose(steps, frames.begin, frames.end, 1);
+  frames.end = SkipStillPose(steps, frames.end - 1, frames.begin - 1, -1) + 1;
+  return frames;
+}
+
+}  // namespace stridewire
