@@ -27,7 +27,9 @@ constexpr double kGravity_m_s2 = -9.81;
 // with deviations below this share of it.
 constexpr double kArchMinM = 0.02;
 constexpr double kArchResidualShare = 0.05;
-constexpr double kHangMax_m_s = 1.5;  // A figure that hangs on something swings at most this fast.
+// A figure that hangs on something swings at most this fast and has raised its feet this far.
+constexpr double kHangMax_m_s = 1.5;
+constexpr double kHangRiseM = 0.03;
 // A runner moves at least this fast and is in the air for at least this time.
 constexpr double kRunMin_m_s = 1.0;
 constexpr double kRunFlightMinS = 0.04;
@@ -123,6 +125,19 @@ Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int las
   return standing;
 }
 
+// Returns true if both feet are higher during a flight than before and after it.
+bool FeetRise(const BodyTracks& tracks, const FrameRange& flight) {
+  const auto lower_foot = [&](int frame) {
+    const auto i = static_cast<std::size_t>(frame);
+    return std::min(tracks.feet[0].ball_m[i].y, tracks.feet[1].ball_m[i].y);
+  };
+  const double ground = std::max(lower_foot(flight.begin), lower_foot(flight.end));
+  for (int i = flight.begin; i < flight.end; ++i) {
+    if (lower_foot(i) > ground + kHangRiseM) return true;
+  }
+  return false;
+}
+
 // Describes a flight in which the pelvis does not fall with 9.81 m/s^2.
 JumpFinding WrongFall(const Fall& fall, const FrameRange& flight, const BodyTracks& tracks) {
   const double seconds = flight.size() / tracks.fps;
@@ -135,7 +150,7 @@ JumpFinding WrongFall(const Fall& fall, const FrameRange& flight, const BodyTrac
                  "per second (the file says %.0f): set --fps %.0f",
                  fall_m_s2 < 3.0 ? 1 : 0, fall_m_s2, rate, tracks.fps, rate)};
   }
-  if (TravelSpeed(tracks, flight) > kHangMax_m_s) {
+  if (TravelSpeed(tracks, flight) > kHangMax_m_s || !FeetRise(tracks, flight)) {
     return {{},
             Text("no foot stands still for %.2f s, but the figure does not fall either "
                  "(%.1f m/s^2): the feet slide",

@@ -103,6 +103,22 @@ TEST(ExtractGround, LeavesOutAStillPoseThatJumpsToTheMotion) {
   }
 }
 
+// A capture that starts 20 cm too low and blends to the motion does not hang on anything.
+TEST(ExtractGround, FindsAllStepsAfterABlendedStart) {
+  Capture capture = SyntheticWalker().Walk(WalkWithRise(0.0));
+  for (int f = 0; f < 48; ++f) {
+    const double u = std::clamp((f - 30) / 18.0, 0.0, 1.0);
+    capture.clip.root_positions_m[static_cast<std::size_t>(f)].y -=
+        static_cast<float>(0.2 * (1.0 - u));
+  }
+  const Extraction found = Extract(capture);
+  EXPECT_EQ(found.steps_left, 3);
+  EXPECT_EQ(found.steps_right, 3);
+  for (const RejectedTime& time : found.rejected) {
+    EXPECT_THAT(time.reason, ::testing::Not(HasSubstr("holds")));
+  }
+}
+
 TEST(ExtractGround, KeepsAFigureThatStandsStillBeforeItMoves) {
   const Extraction found = Extract(SyntheticWalker().Walk(WalkWithRise(0.0)));
   EXPECT_THAT(found.notes, ::testing::Not(::testing::Contains(HasSubstr("still pose"))));
