@@ -54,8 +54,8 @@ struct SyntheticWalker {
 /// Removes the travel of the root along z, like an export "in place".
 void RemoveTravel(Capture& capture);
 
-/// Puts a still pose before a capture: the joints unrotated, the root at its first position, lowered
-/// by `lower_m`.
+/// Puts a still pose before a capture: the joints unrotated, the root at its first position,
+/// lowered by `lower_m`.
 void PrependStillPose(int frames, double lower_m, Capture& capture);
 
 /// Height of the balls of the standing figure above the ground.

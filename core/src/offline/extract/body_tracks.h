@@ -24,8 +24,8 @@ struct BodyTracks {
   std::vector<DVec3> pelvis_m;
   std::vector<double> pelvis_speed_m_s;  ///< Speed along the path smoothed over 60 ms.
   std::vector<double> pelvis_yaw_rad;    ///< Unwrapped yaw of the pelvis; positive is left.
-  /// Mean position of the joints that belong to neither leg, weighted by the lengths of their bones.
-  /// Empty if there are none.
+  /// Mean position of the joints that belong to neither leg, weighted by the lengths of their
+  /// bones. Empty if there are none.
   std::vector<DVec3> trunk_m;
   double leg_length_m = 0.9;  ///< Length of thigh plus shank, averaged over both legs.
 

@@ -99,8 +99,8 @@ class ContactBridge {
   double speed_max_m_s_;
 };
 
-// Returns one flag per frame: non-zero if the foot `other` does not stand and is fast, or if no foot
-// stands for so short a time that the figure cannot have jumped.
+// Returns one flag per frame: non-zero if the foot `other` does not stand and is fast, or if no
+// foot stands for so short a time that the figure cannot have jumped.
 std::vector<char> OtherSwings(const FootPaths& other_foot, int other, double fps,
                               const FootContacts& contacts, const ContactOptions& options) {
   const int count = static_cast<int>(other_foot.slowest_m_s.size());

@@ -145,7 +145,8 @@ class RestFinder {
     if (ComesToRest({end, range.end})) Collect({end, range.end});
   }
 
-  // Joins contacts at the same height or on one place with short gaps, and separates contacts without a gap.
+  // Joins contacts at the same height or on one place with short gaps, and separates contacts
+  // without a gap.
   void Join() {
     std::vector<Contact> joined;
     for (Contact& contact : found_) {

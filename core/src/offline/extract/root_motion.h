@@ -6,20 +6,20 @@
 
 namespace stridewire {
 
-/// How far the ground moves below a figure, seen from its supporting foot: that foot stands still on
-/// the ground, so the ground moves as the foot does.
+/// How far the ground moves below a figure, seen from its supporting foot: that foot stands still
+/// on the ground, so the ground moves as the foot does.
 struct GroundTravel {
   std::vector<DVec3> position_m;  ///< Horizontal path of the ground, one point per frame.
   double length_m = 0.0;          ///< Length of the path at the speed of a walk.
   double left_share = 0.0;        ///< Share of `length_m` during which the left foot supports.
 };
 
-/// Measures the travel of the ground. It assumes level ground, so it is valid only for figures whose
-/// pelvis stays in place. While both feet are in the air, the ground keeps its speed.
+/// Measures the travel of the ground. It assumes level ground, so it is valid only for figures
+/// whose pelvis stays in place. While both feet are in the air, the ground keeps its speed.
 [[nodiscard]] GroundTravel MeasureGroundTravel(const BodyTracks& tracks);
 
-/// Returns true if the figure walks on the spot: both feet in turn slide along the ground, while the
-/// pelvis stays in place. Animations for games are often exported like this.
+/// Returns true if the figure walks on the spot: both feet in turn slide along the ground, while
+/// the pelvis stays in place. Animations for games are often exported like this.
 [[nodiscard]] bool WalksOnTheSpot(const BodyTracks& tracks, const GroundTravel& travel);
 
 /// Moves the root such that the supporting foot stands still. The travel starts at frame
