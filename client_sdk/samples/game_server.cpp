@@ -12,6 +12,7 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -230,9 +231,7 @@ int Run(const Settings& settings) {
   return 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int RunProgram(int argc, char** argv) {
   Settings settings;
   std::string connect = "127.0.0.1:7420";
   CLI::App app(
@@ -276,4 +275,15 @@ int main(int argc, char** argv) {
   std::signal(SIGINT, [](int) { stop_requested = 1; });
   std::signal(SIGTERM, [](int) { stop_requested = 1; });
   return Run(settings);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return RunProgram(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "sample_game_server: %s\n", error.what());
+    return 1;
+  }
 }

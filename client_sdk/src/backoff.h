@@ -5,13 +5,13 @@
 
 namespace stridewire::client {
 
-/// Delays between attempts to connect. The first delay is kFirst_s, and every attempt doubles it up
-/// to kLongest_s. Each delay is shortened by a random fraction of up to kJitter, so that the
+/// Delays between attempts to connect. The first delay is kFirstS, and every attempt doubles it up
+/// to kLongestS. Each delay is shortened by a random fraction of up to kJitter, so that the
 /// clients of a restarted server do not reconnect all at once (STATE_MACHINE.md, "Timeouts").
 class Backoff {
  public:
-  static constexpr double kFirst_s = 0.1;
-  static constexpr double kLongest_s = 5.0;
+  static constexpr double kFirstS = 0.1;
+  static constexpr double kLongestS = 5.0;
   static constexpr double kJitter = 0.5;
 
   explicit Backoff(std::uint64_t seed) : random_(seed) {}
@@ -19,12 +19,12 @@ class Backoff {
   /// Returns the delay before the next attempt in seconds.
   [[nodiscard]] double Next();
 
-  /// Starts again with kFirst_s, after a successful attempt.
-  void Reset() { max_delay_s_ = kFirst_s; }
+  /// Starts again with kFirstS, after a successful attempt.
+  void Reset() { max_delay_s_ = kFirstS; }
 
  private:
   std::mt19937_64 random_;
-  double max_delay_s_ = kFirst_s;
+  double max_delay_s_ = kFirstS;
 };
 
 }  // namespace stridewire::client

@@ -104,7 +104,7 @@ void stridewire_client_destroy(stridewire_client* client) {
   (void)stridewire_client_disconnect(client);
   {
     std::unique_lock lock(client->mutex);
-    client->changed.wait_for(lock, std::chrono::duration<double>(2.0 * Session::kGoodbye_s),
+    client->changed.wait_for(lock, std::chrono::duration<double>(2.0 * Session::kGoodbyeS),
                              [&] { return client->session.state() != Session::State::kClosing; });
   }
   delete client;

@@ -10,9 +10,9 @@ namespace stridewire::client {
 void ClockMap::AddSample(double local_s, double server_s) {
   STRIDEWIRE_CHECK(!ready_ || local_s >= at_local_s_);
   const double offset_s = local_s - server_s;
-  const auto number = static_cast<std::int64_t>(std::floor(local_s / kBucket_s));
+  const auto number = static_cast<std::int64_t>(std::floor(local_s / kBucketS));
 
-  if (ready_ && std::abs(offset_s - target_offset_s_) > kSnap_s) {
+  if (ready_ && std::abs(offset_s - target_offset_s_) > kSnapS) {
     // A much larger offset may be a single late message, so the window decides. A much smaller
     // offset cannot be explained by delays: the server's clock has changed.
     if (offset_s < target_offset_s_) Reset();
@@ -34,8 +34,8 @@ void ClockMap::AddSample(double local_s, double server_s) {
     offset_s_ = smallest_s;
   } else {
     offset_s_ = OffsetAt(local_s);
-    const bool settling = local_s - first_local_s_ < kSettle_s;
-    if (std::abs(smallest_s - offset_s_) > kSnap_s || (settling && smallest_s < offset_s_)) {
+    const bool settling = local_s - first_local_s_ < kSettleS;
+    if (std::abs(smallest_s - offset_s_) > kSnapS || (settling && smallest_s < offset_s_)) {
       offset_s_ = smallest_s;
     }
   }

@@ -9,19 +9,19 @@ namespace stridewire::client {
 ///
 /// If a message with server time s arrives at local time l, the offset l - s is the difference of
 /// the clocks plus the delay of the message. Delays are never negative, so the smallest offset of
-/// the last kWindow_s is the best estimate. The map approaches it at a rate of at most kSlew, so
+/// the last kWindowS is the best estimate. The map approaches it at a rate of at most kSlew, so
 /// that the mapped time neither jumps nor runs backwards. It jumps in two cases only: if the
-/// estimate changes by more than kSnap_s, which means that the server's clock has changed, and for
-/// smaller offsets during the first kSettle_s.
+/// estimate changes by more than kSnapS, which means that the server's clock has changed, and for
+/// smaller offsets during the first kSettleS.
 class ClockMap {
  public:
   static constexpr int kBuckets = 8;
-  static constexpr double kBucket_s = 0.5;
-  static constexpr double kWindow_s = kBuckets * kBucket_s;
+  static constexpr double kBucketS = 0.5;
+  static constexpr double kWindowS = kBuckets * kBucketS;
   /// Largest rate of change of the offset, in seconds per second.
   static constexpr double kSlew = 0.02;
-  static constexpr double kSnap_s = 0.25;
-  static constexpr double kSettle_s = 1.0;
+  static constexpr double kSnapS = 0.25;
+  static constexpr double kSettleS = 1.0;
 
   /// Adds a message with server time `server_s` that arrived at `local_s`. Local times never
   /// decrease.

@@ -141,7 +141,7 @@ void Session::LoseConnection(stridewire_status status, std::string_view text, do
   last_text_ = text.empty() ? stridewire_status_text(status) : text;
   STRIDEWIRE_CHECK(NeedsSocket() && state_ != State::kClosing);
   const bool was_ready = state_ == State::kReady;
-  if (was_ready && now_s - ready_s_ >= kStable_s) backoff_.Reset();
+  if (was_ready && now_s - ready_s_ >= kStableS) backoff_.Reset();
   if (!was_ready) ++connect_failures_;
   state_ = State::kWaiting;
   next_attempt_s_ = now_s + backoff_.Next();
@@ -209,7 +209,7 @@ void Session::Close(double now_s) {
     if (encoder_.Encode(protocol::Goodbye{}, output_)) {
       state_ = State::kClosing;
       connection_number_ = connection;
-      deadline_s_ = now_s + kGoodbye_s;
+      deadline_s_ = now_s + kGoodbyeS;
     }
   }
   if (!was_closed) events_.Push(MakeEvent(STRIDEWIRE_EVENT_CLOSED));

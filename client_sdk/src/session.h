@@ -19,9 +19,9 @@ namespace stridewire::client {
 class Session : public SessionCommands {
  public:
   /// Longest time to send Goodbye, in seconds.
-  static constexpr double kGoodbye_s = 1.0;
+  static constexpr double kGoodbyeS = 1.0;
   /// If a connection was ready for this time, the back-off starts again with its shortest delay.
-  static constexpr double kStable_s = 2.0;
+  static constexpr double kStableS = 2.0;
 
   using SessionCommands::SessionCommands;
 

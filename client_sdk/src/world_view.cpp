@@ -171,7 +171,7 @@ void WorldView::EraseGone(double time_s) {
   for (auto track = tracks_.begin(); track != tracks_.end();) {
     const Track& t = track->second;
     const bool forget = t.gone && t.history->size() > 0 &&
-                        time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGone_s;
+                        time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGoneS;
     track = forget ? Erase(track) : std::next(track);
   }
 }

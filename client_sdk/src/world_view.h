@@ -26,7 +26,7 @@ struct PoseBudget {
 class WorldView : public PoseSink {
  public:
   /// Poses of an avatar that is gone can be sampled for this time, in seconds of server time.
-  static constexpr double kKeepGone_s = 2.0;
+  static constexpr double kKeepGoneS = 2.0;
   /// The view ignores batches from before an avatar left the region for this number of ticks.
   static constexpr std::uint64_t kKeepLeftTicks = 600;
   /// A batch from more shards than this is an error.
@@ -120,7 +120,7 @@ class WorldView : public PoseSink {
   /// Must be called after the last part of a batch. Marks avatars of its shard and mode that were
   /// not in it as gone.
   void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
-  /// Erases avatars that have been gone for longer than kKeepGone_s.
+  /// Erases avatars that have been gone for longer than kKeepGoneS.
   void EraseGone(double time_s);
   Tracks::iterator Erase(Tracks::iterator track);
 

@@ -17,7 +17,7 @@ namespace {
 
 bool WaitReadable(int fd) {
   pollfd p{fd, POLLIN, 0};
-  return poll(&p, 1, static_cast<int>(FakeServer::kPatience_s * 1000.0)) == 1;
+  return poll(&p, 1, static_cast<int>(FakeServer::kPatienceS * 1000.0)) == 1;
 }
 
 }  // namespace

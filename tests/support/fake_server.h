@@ -12,7 +12,7 @@
 #include "stridewire/protocol/messages.h"
 
 /// A scripted server for tests of clients, over a real socket on 127.0.0.1. Its calls block for at
-/// most kPatience_s, and it has no threads.
+/// most kPatienceS, and it has no threads.
 namespace stridewire {
 
 class FakeConnection {
@@ -62,7 +62,7 @@ class FakeConnection {
 
 class FakeServer {
  public:
-  static constexpr double kPatience_s = 20.0;
+  static constexpr double kPatienceS = 20.0;
 
   /// Listens on `port`; 0: the system chooses a port.
   explicit FakeServer(std::uint16_t port = 0);

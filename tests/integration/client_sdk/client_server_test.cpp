@@ -35,10 +35,10 @@ using test::RunProgram;
 using test::ScratchFolder;
 using testing::HasSubstr;
 
-constexpr double kPatience_s = 60.0;
+constexpr double kPatienceS = 60.0;
 
 bool Eventually(const std::function<bool()>& holds) {
-  const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
+  const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceS);
   while (!holds()) {
     if (std::chrono::steady_clock::now() > until) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -86,8 +86,7 @@ class User {
   }
 
   std::optional<stridewire_event> Next(stridewire_event_type type) {
-    const auto until =
-        std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceS);
     stridewire_event event;
     while (std::chrono::steady_clock::now() < until) {
       while (client.PollEvent(event)) {

@@ -19,7 +19,7 @@ namespace {
 using client::Client;
 using client::Options;
 
-constexpr double kPatience_s = 20.0;
+constexpr double kPatienceS = 20.0;
 
 class ClientTest : public testing::Test {
  protected:
@@ -58,8 +58,7 @@ class ClientTest : public testing::Test {
 
   /// Returns the next event of a type and drops the events before it.
   std::optional<stridewire_event> Next(stridewire_event_type type) {
-    const auto until =
-        std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceS);
     stridewire_event event;
     while (std::chrono::steady_clock::now() < until) {
       while (client_->PollEvent(event)) {
@@ -71,8 +70,7 @@ class ClientTest : public testing::Test {
   }
 
   static bool Eventually(const std::function<bool()>& holds) {
-    const auto until =
-        std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceS);
     while (!holds()) {
       if (std::chrono::steady_clock::now() > until) return false;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -108,7 +108,7 @@ TEST_F(WorldViewTest, ErasesAvatarsThatAreGoneForLong) {
   ASSERT_TRUE(Take(1, {{1}, {2}}));
   const std::size_t two = budget_.used_bytes;
   std::uint64_t tick = 2;
-  for (; test_world::TickTime(tick) < 1.0 + WorldView::kKeepGone_s; ++tick)
+  for (; test_world::TickTime(tick) < 1.0 + WorldView::kKeepGoneS; ++tick)
     ASSERT_TRUE(Take(tick, {{1}}));
   EXPECT_EQ(view_.Find(2), nullptr);
   EXPECT_EQ(budget_.used_bytes, two / 2);

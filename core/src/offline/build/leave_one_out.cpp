@@ -148,7 +148,7 @@ struct Comparison {
 };
 
 std::vector<double> Keytimes(const MotionGroup& group, std::span<const double> weights) {
-  const auto keys = static_cast<std::size_t>(group.interval_count() + 1);
+  const auto keys = static_cast<std::size_t>(group.interval_count()) + 1;
   std::vector<double> keytimes(keys);
   for (std::size_t e = 0; e < weights.size(); ++e) {
     for (std::size_t k = 0; k < keys; ++k) {

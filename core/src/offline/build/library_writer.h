@@ -14,7 +14,7 @@ struct LibraryContent {
   const Skeleton& skeleton;
   const Pose& stand_pose;
   std::span<const MotionGroup> groups;
-  std::span<const LayerClip> layers = {};
+  std::span<const LayerClip> layers;
 };
 
 /// Writes the bytes of a library file and opens them again, which validates them. The same content

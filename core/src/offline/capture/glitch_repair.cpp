@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 // Faster rotations are glitches. Arms reach about 1000 degrees/s in a jump.
-constexpr double kJumpRad_s = 1800.0 * kDegree;
+constexpr double kJumpRadPerS = 1800.0 * kDegree;
 // Smaller rotations are not glitches, but noise at 240 Hz and above.
 constexpr double kJumpMinRad = 12.0 * kDegree;
 // Larger rotations per frame are always glitches. At 30 Hz, 1800 degrees/s would allow too much.
@@ -77,7 +77,7 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
                  GlitchReport& report) {
   Track track(clip, joint);
   const int end = clip.frame_count();
-  const double limit = std::clamp(kJumpRad_s / clip.fps, kJumpMinRad, kJumpMaxRad);
+  const double limit = std::clamp(kJumpRadPerS / clip.fps, kJumpMinRad, kJumpMaxRad);
   const int spike = std::max(2, static_cast<int>(std::lround(kSpikeS * clip.fps)));
   const int spread = std::max(1, static_cast<int>(std::lround(0.5 * kSpreadS * clip.fps)));
   // A jump at f is the rotation between f and f + 1.

@@ -18,7 +18,7 @@ constexpr double kStepMaxS = 1.0;
 // The fit at the ends of a recording uses priors with these standard deviations.
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNoiseRad = 4.0 * kDegree;
-constexpr double kSlopeRad_s = 50.0 * kDegree;
+constexpr double kSlopeRadPerS = 50.0 * kDegree;
 constexpr double kOscillationRad = 8.0 * kDegree;
 constexpr double kIndependentShare = 0.1;  // Neighbouring frames are strongly correlated.
 
@@ -79,7 +79,7 @@ double FitAtEnd(const std::vector<double>& yaw, int begin, int end, int centre,
     right += row * (yaw[static_cast<std::size_t>(i)] - reference);
   }
   const double weight = kIndependentShare * (end - begin) * kNoiseRad * kNoiseRad;
-  normal(1, 1) += weight / (kSlopeRad_s * kSlopeRad_s);
+  normal(1, 1) += weight / (kSlopeRadPerS * kSlopeRadPerS);
   normal(2, 2) += weight / (kOscillationRad * kOscillationRad);
   normal(3, 3) += weight / (kOscillationRad * kOscillationRad);
   return reference + normal.ldlt().solve(right)(0);
