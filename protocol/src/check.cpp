@@ -81,13 +81,13 @@ void CheckMeaning(Findings& found, const FieldPath& at, const TerrainBoxInfo& m)
              "expected max above min", at);
 }
 
-void CheckMeaning(Findings& found, const FieldPath& at, const SkeletonInfo& skeleton) {
-  const auto joint_count = static_cast<std::int64_t>(skeleton.joints.size());
+void CheckMeaning(Findings& found, const FieldPath& at, const SkeletonInfo& m) {
+  const auto joint_count = static_cast<std::int64_t>(m.joints.size());
   const FieldPath joints = At(at, "joints");
   std::vector<std::string_view> names;
-  names.reserve(skeleton.joints.size());
+  names.reserve(m.joints.size());
   for (std::int64_t j = 0; j < joint_count; ++j) {
-    const JointInfo& joint = skeleton.joints[static_cast<std::size_t>(j)];
+    const JointInfo& joint = m.joints[static_cast<std::size_t>(j)];
     found.That(j == 0 ? joint.parent == -1 : joint.parent >= 0 && joint.parent < j,
                At(Entry(joints, static_cast<std::size_t>(j)), "parent"), joint.parent,
                "expected -1 for joint 0, else a joint that precedes this one");
@@ -97,12 +97,12 @@ void CheckMeaning(Findings& found, const FieldPath& at, const SkeletonInfo& skel
   found.That(std::adjacent_find(names.begin(), names.end()) == names.end(), ErrorCode::kMalformed,
              "a name occurs twice", At(joints, "name"));
   const FieldPath end_sites = At(at, "end_sites");
-  for (std::size_t e = 0; e < skeleton.end_sites.size(); ++e) {
-    found.That(skeleton.end_sites[e].joint < joint_count, At(Entry(end_sites, e), "joint"),
-               skeleton.end_sites[e].joint, "expected the index of a joint");
+  for (std::size_t e = 0; e < m.end_sites.size(); ++e) {
+    found.That(m.end_sites[e].joint < joint_count, At(Entry(end_sites, e), "joint"),
+               m.end_sites[e].joint, "expected the index of a joint");
   }
   for (const bool is_right : {false, true}) {
-    const LegInfo& leg = skeleton.legs[is_right];
+    const LegInfo& leg = m.legs[is_right];
     for (const std::int16_t joint : {leg.hip, leg.knee, leg.ankle, leg.ball}) {
       found.That(joint >= -1 && joint < joint_count, At(at, is_right ? "right_leg" : "left_leg"),
                  joint, "expected the index of a joint, or -1");
@@ -213,7 +213,7 @@ void CheckMeaning(Findings& found, const FieldPath& at, const LibraryPiece& m) {
 template <typename M>
 Status Check(const M& message) {
   Findings found;
-  CheckFields(found, FieldPath{.name = MessageTypeName(M::kType).data()}, message);
+  CheckFields(found, FieldPath{.name = MessageTypeName(M::kType)}, message);
   return found.Result();
 }
 

@@ -44,7 +44,7 @@ Expected<Message> Decode(std::span<const std::byte> payload) {
   }
   T message;
   Unpacker unpacker;
-  const FieldPath path{.name = MessageTypeName(T::kType).data()};
+  const FieldPath path{.name = MessageTypeName(T::kType)};
   Unpack(unpacker, path, *flatbuffers::GetRoot<Wire>(bytes), message);
   if (unpacker.ok()) CheckFields(unpacker, path, message);
   if (Status status = unpacker.Result(); !status) return std::unexpected(std::move(status.error()));

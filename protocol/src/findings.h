@@ -19,11 +19,11 @@ namespace stridewire::protocol {
 /// error is reported, so that a check which holds allocates nothing.
 struct FieldPath {
   const FieldPath* parent = nullptr;
-  const char* name = "";
+  std::string_view name;
   std::int64_t index = -1;  ///< Index of an entry, if the field is a list.
 };
 
-[[nodiscard]] inline FieldPath At(const FieldPath& parent, const char* name) {
+[[nodiscard]] inline FieldPath At(const FieldPath& parent, std::string_view name) {
   return {&parent, name, -1};
 }
 /// Returns the path of an entry of the list at `list`.

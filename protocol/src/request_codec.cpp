@@ -34,18 +34,18 @@ void CheckValue(Findings& found, const FieldPath& at, E value) {
 
 }  // namespace
 
-void CheckFields(Findings& found, const FieldPath& at, const RequestItem& item) {
+void CheckFields(Findings& found, const FieldPath& at, const RequestItem& m) {
   VisitRequest(
-      item, [&](const char* name, const auto& value) { CheckValue(found, At(at, name), value); });
-  const auto* step = std::get_if<StepMovement>(&item.movement);
+      m, [&](const char* name, const auto& value) { CheckValue(found, At(at, name), value); });
+  const auto* step = std::get_if<StepMovement>(&m.movement);
   found.That(step == nullptr || step->at || !step->exact_only, ErrorCode::kMalformed,
              "must_be_met requires at_m", At(at, "at_m"));
 }
 
-void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, RequestItem& item) {
-  item.avatar = w.avatar();
-  item.request_id = w.request_id();
-  item.interrupt = static_cast<Interrupt>(w.takeover());
+void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, RequestItem& m) {
+  m.avatar = w.avatar();
+  m.request_id = w.request_id();
+  m.interrupt = static_cast<Interrupt>(w.takeover());
   switch (w.type()) {
     case wire::MovementType::Step: {
       StepMovement step{.foot = static_cast<FootChoice>(w.foot()), .exact_only = w.must_be_met()};
@@ -58,13 +58,13 @@ void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, Reques
         step.height_m = w.height_m();
         step.turn_rad = w.turn_rad();
       }
-      item.movement = step;
+      m.movement = step;
       break;
     }
     case wire::MovementType::Jump:
-      item.movement = JumpMovement{w.length_m(), w.height_m(), w.turn_rad()};
+      m.movement = JumpMovement{w.length_m(), w.height_m(), w.turn_rad()};
       break;
-    case wire::MovementType::Stand: item.movement = StandMovement{w.seconds()}; break;
+    case wire::MovementType::Stand: m.movement = StandMovement{w.seconds()}; break;
     case wire::MovementType::Walk: {
       if (w.at_m() == nullptr || !w.heading_rad()) {
         u.Wrong(ErrorCode::kMalformed, "a walk requires at_m and heading_rad", At(at, "type"));
@@ -73,7 +73,7 @@ void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, Reques
       WalkMovement walk{.heading_rad = *w.heading_rad(), .speed_m_s = w.speed_m_s()};
       Unpack(u, at, *w.at_m(), walk.position_m);
       UnpackList(u, w.waypoints_m(), kWaypoints, At(at, "waypoints_m"), walk.waypoints_m);
-      item.movement = std::move(walk);
+      m.movement = std::move(walk);
       break;
     }
     default: u.Known(w.type(), 3, At(at, "type"), "expected a number from 0 to 3");
@@ -81,11 +81,11 @@ void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, Reques
 }
 
 // flatbuffers::Optional is std::optional.
-Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
-  const auto* step = std::get_if<StepMovement>(&item.movement);
-  const auto* jump = std::get_if<JumpMovement>(&item.movement);
-  const auto* stand = std::get_if<StandMovement>(&item.movement);
-  const auto* walk = std::get_if<WalkMovement>(&item.movement);
+Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& m) {
+  const auto* step = std::get_if<StepMovement>(&m.movement);
+  const auto* jump = std::get_if<JumpMovement>(&m.movement);
+  const auto* stand = std::get_if<StandMovement>(&m.movement);
+  const auto* walk = std::get_if<WalkMovement>(&m.movement);
   const auto foot = step ? step->foot : FootChoice::kAuto;
   const bool is_placed = step && step->at;
   double length_m = 0.0, height_m = 0.0, turn_rad = 0.0;
@@ -110,10 +110,10 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
     heading_rad = walk->heading_rad;
   }
   return wire::CreateRequestItem(
-      b, item.avatar, item.request_id, static_cast<wire::MovementType>(item.movement.index()),
+      b, m.avatar, m.request_id, static_cast<wire::MovementType>(m.movement.index()),
       static_cast<wire::FootChoice>(foot), length_m, side_m, height_m, turn_rad,
       stand ? stand->seconds : 0.0, at ? &*at : nullptr, heading_rad, waypoints,
-      walk ? walk->speed_m_s : std::nullopt, static_cast<wire::Takeover>(item.interrupt),
+      walk ? walk->speed_m_s : std::nullopt, static_cast<wire::Takeover>(m.interrupt),
       step && step->exact_only);
 }
 

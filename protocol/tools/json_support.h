@@ -57,7 +57,7 @@ void FromJson(const Json& json, E& out) {
 }
 inline void FromJson(const Json& json, std::string& out) { json.get_to(out); }
 void FromJson(const Json& json, std::vector<std::byte>& out);
-void FromJson(const Json& json, ParameterSet& out);
+void FromJson(const Json& json, ParameterSet& set);
 template <typename V>
   requires std::is_same_v<V, Vec3> || std::is_same_v<V, DVec3>
 void FromJson(const Json& json, V& v) {

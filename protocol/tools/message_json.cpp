@@ -22,31 +22,31 @@ Json Value(const std::vector<std::byte>& bytes) {
   return text;
 }
 
-Json Fields(const RotationQuantization& code) {
-  const Quat& q = code.reference;
+Json Fields(const RotationQuantization& m) {
+  const Quat& q = m.reference;
   return {{"reference", Json::array({q.x, q.y, q.z, q.w})},
-          {"low", Value(code.low)},
-          {"step", Value(code.step)},
-          {"bits", code.bits},
-          {"free_bits", code.smallest_three_bits},
-          {"least_w", code.least_w}};
+          {"low", Value(m.low)},
+          {"step", Value(m.step)},
+          {"bits", m.bits},
+          {"free_bits", m.smallest_three_bits},
+          {"least_w", m.least_w}};
 }
 
-Json Fields(const RequestItem& item) {
+Json Fields(const RequestItem& m) {
   Json json = Json::object();
-  VisitRequest(item, [&](const char* name, const auto& value) { json[name] = Value(value); });
+  VisitRequest(m, [&](const char* name, const auto& value) { json[name] = Value(value); });
   return json;
 }
 
-void FromJson(const Json& json, RequestItem& item) {
+void FromJson(const Json& json, RequestItem& m) {
   const auto type = json.at("type").get<MovementType>();
-  if (type == MovementType::kJump) item.movement = JumpMovement{};
-  if (type == MovementType::kStand) item.movement = StandMovement{};
-  if (type == MovementType::kWalk) item.movement = WalkMovement{};
+  if (type == MovementType::kJump) m.movement = JumpMovement{};
+  if (type == MovementType::kStand) m.movement = StandMovement{};
+  if (type == MovementType::kWalk) m.movement = WalkMovement{};
   if (type == MovementType::kStep && json.contains("at_m")) {
-    item.movement = StepMovement{.at = Footprint{}};
+    m.movement = StepMovement{.at = Footprint{}};
   }
-  VisitRequest(item, [&]<typename T>(const char* name, T& value) {
+  VisitRequest(m, [&]<typename T>(const char* name, T& value) {
     if constexpr (!std::is_const_v<T>) Get(json, name, value);
   });
 }
@@ -95,14 +95,14 @@ void FromJson(const Json& json, std::vector<std::byte>& out) {
   }
 }
 
-void FromJson(const Json& json, RotationQuantization& code) {
+void FromJson(const Json& json, RotationQuantization& m) {
   const std::vector<float> q = json.at("reference");
-  code.reference = Quat(q.at(3), q.at(0), q.at(1), q.at(2));
-  Get(json, "low", code.low);
-  Get(json, "step", code.step);
-  json.at("bits").get_to(code.bits);
-  Get(json, "free_bits", code.smallest_three_bits);
-  Get(json, "least_w", code.least_w);
+  m.reference = Quat(q.at(3), q.at(0), q.at(1), q.at(2));
+  Get(json, "low", m.low);
+  Get(json, "step", m.step);
+  json.at("bits").get_to(m.bits);
+  Get(json, "free_bits", m.smallest_three_bits);
+  Get(json, "least_w", m.least_w);
 }
 
 void FromJson(const Json& json, ParameterSet& set) {

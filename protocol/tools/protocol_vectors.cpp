@@ -20,9 +20,7 @@ bool Write(const std::filesystem::path& path, std::string_view bytes) {
   return static_cast<bool>(file);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Run(int argc, char** argv) {
   const std::string_view argument = argc > 1 ? argv[1] : "--help";
   if (argument == "--version") {
     std::cout << "protocol_vectors " << stridewire::kVersion << "\n";
@@ -69,4 +67,15 @@ int main(int argc, char** argv) {
     }
   }
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return Run(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "protocol_vectors: " << error.what() << "\n";
+    return 1;
+  }
 }
