@@ -26,17 +26,43 @@ struct Pool {
   std::vector<RawExample> examples;
 };
 
+bool IsHeight(ParameterName name) {
+  return name == ParameterName::kStartY || name == ParameterName::kEndY ||
+         name == ParameterName::kHeight;
+}
+
+// Returns the range of a parameter in a pool. The lowest and the highest value are ignored if there
+// are enough examples. The range of a height includes 0 and every example: neither a single
+// climbing example nor a pool of nothing but equal climbs may pass for level.
 double Spread(const Pool& pool, std::size_t parameter) {
   std::vector<double> values;
   for (const RawExample& example : pool.examples) values.push_back(example.parameters[parameter]);
   if (values.empty()) return 0.0;
+  const bool is_height = IsHeight(pool.names[parameter]);
+  if (is_height) values.push_back(0.0);
   std::ranges::sort(values);
-  const std::size_t skip = values.size() >= kOutlierFreeMin ? 1 : 0;
+  const std::size_t skip = values.size() >= kOutlierFreeMin && !is_height ? 1 : 0;
   return values[values.size() - 1 - skip] - values[skip];
 }
 
-// Returns the indices of the parameters in which a pool varies, including `always`. The number is
-// limited by the number of examples, but `always` is complete.
+// Returns true if a pool has enough examples for `always` and for the heights that vary in it.
+// Without them, climbing and level examples would be averaged, and the figure would sink into level
+// ground. Examples span a space only if there is at least one more than it has dimensions.
+bool CanKeepHeights(const Pool& pool, std::span<const ParameterName> always,
+                    const AssembleOptions& options) {
+  std::size_t needed = always.size() + 1;
+  bool is_varied = false;
+  for (std::size_t i = 0; i < pool.names.size(); ++i) {
+    if (!IsHeight(pool.names[i]) || Spread(pool, i) < options.spread_min_m) continue;
+    ++needed;
+    is_varied = true;
+  }
+  return !is_varied || pool.examples.size() >= needed;
+}
+
+// Returns the indices of the parameters in which a pool varies, including `always`. Heights that
+// vary are always kept if `with_height`. The number of the others is limited by the number of
+// examples.
 std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const ParameterName> always,
                                            bool with_height, const AssembleOptions& options) {
   struct Candidate {
@@ -45,20 +71,23 @@ std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const Par
     bool fixed;
   };
   std::vector<Candidate> candidates;
+  std::size_t fixed_count = 0;
   for (std::size_t i = 0; i < pool.names.size(); ++i) {
     const ParameterName name = pool.names[i];
-    const bool fixed = std::ranges::find(always, name) != always.end();
-    const bool height = name == ParameterName::kStartY || name == ParameterName::kEndY;
-    if (height && !with_height) continue;
+    if (IsHeight(name) && !with_height) continue;
     const double least =
         name == ParameterName::kTurn ? options.spread_min_rad : options.spread_min_m;
     const double spread = Spread(pool, i) / least;
-    if (fixed || spread >= 1.0) candidates.push_back({i, spread, fixed});
+    const bool fixed =
+        std::ranges::find(always, name) != always.end() || (IsHeight(name) && spread >= 1.0);
+    if (!fixed && spread < 1.0) continue;
+    candidates.push_back({i, spread, fixed});
+    fixed_count += fixed ? 1 : 0;
   }
   std::ranges::stable_sort(candidates, [](const Candidate& a, const Candidate& b) {
     return std::pair(a.fixed, a.spread) > std::pair(b.fixed, b.spread);
   });
-  const std::size_t most = std::max(always.size(), pool.examples.size() / kExamplesPerParameter);
+  const std::size_t most = std::max(fixed_count, pool.examples.size() / kExamplesPerParameter);
   if (candidates.size() > most) candidates.resize(most);
   std::vector<std::size_t> indices;
   for (const Candidate& candidate : candidates) indices.push_back(candidate.index);
@@ -111,12 +140,14 @@ class Assembler {
     }
     RawLibrary library;
     library.skeleton = skeleton_;
-    if (options_.steps) {
-      AddStepGroups(library);
-    }
+    const bool has_dropped_climbs = options_.steps && AddStepGroups(library);
     if (options_.jumps) AddJumpGroup(library);
     if (library.groups.empty()) {
-      return Fail(ErrorCode::kNotFound, "the captures contain no usable step or jump");
+      return Fail(ErrorCode::kNotFound,
+                  has_dropped_climbs
+                      ? "the captures contain climbing steps only, and too few of them: "
+                        "at least 5 of one foot are needed, or level steps"
+                      : "the captures contain no usable step or jump");
     }
     library.stand_pose = StandPose(library);
     return library;
@@ -156,7 +187,9 @@ class Assembler {
     return pool;
   }
 
-  void AddStepGroups(RawLibrary& library) const {
+  // Returns true if there are climbing steps, but too few for a group.
+  bool AddStepGroups(RawLibrary& library) const {
+    bool has_dropped_climbs = false;
     constexpr Foot kFeet[] = {Foot::kLeft, Foot::kRight};
     const auto all = [](const ExtractedExample&) { return true; };
     const auto level = [](const ExtractedExample& e) { return e.level; };
@@ -170,7 +203,10 @@ class Assembler {
       all_steps[f] = Gather(kind, kGeneralStepParameters, &Extraction::general_steps, all);
       const std::size_t straight_count = straight_steps[f].examples.size();
       const std::size_t level_count = level_steps[f].examples.size();
-      if (all_steps[f].examples.size() <= level_count) all_steps[f].examples.clear();
+      const bool has_climbs = all_steps[f].examples.size() > level_count;
+      const bool keeps_heights = CanKeepHeights(all_steps[f], kStraightStepParameters, options_);
+      if (has_climbs && !keeps_heights) has_dropped_climbs = true;
+      if (!has_climbs || !keeps_heights) all_steps[f].examples.clear();
       if (level_count <= straight_count) level_steps[f].examples.clear();
       // Two examples lie on a line, so no weights could reproduce parameters beside it.
       const bool has_all = !all_steps[f].examples.empty();
@@ -184,6 +220,7 @@ class Assembler {
     }
     for (Pool& pool : level_steps) AddGeneral(std::move(pool), false, library);
     for (Pool& pool : all_steps) AddGeneral(std::move(pool), true, library);
+    return has_dropped_climbs;
   }
 
   void AddGeneral(Pool pool, bool with_height, RawLibrary& library) const {
@@ -199,8 +236,19 @@ class Assembler {
                [&](const ExtractedExample& e) { return e.settled || options_.unsettled_jumps; });
     if (pool.examples.empty()) return;
     constexpr ParameterName kAlways[] = {ParameterName::kLength};
+    if (!CanKeepHeights(pool, kAlways, options_)) KeepOneHeight(pool);
     const std::vector<std::size_t> spanned = SpannedParameters(pool, kAlways, true, options_);
     library.groups.push_back(MakeGroup(std::move(pool), spanned));
+  }
+
+  // Keeps the jumps that land at the same height as the first one.
+  void KeepOneHeight(Pool& pool) const {
+    const auto i = static_cast<std::size_t>(std::ranges::find(pool.names, ParameterName::kHeight) -
+                                            pool.names.begin());
+    const double height_m = pool.examples.front().parameters[i];
+    std::erase_if(pool.examples, [&](const RawExample& example) {
+      return std::fabs(example.parameters[i] - height_m) >= options_.spread_min_m;
+    });
   }
 
   // Returns the stillest standing pose of all captures. If there is none, returns the first pose of

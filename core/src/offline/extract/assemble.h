@@ -33,6 +33,11 @@ struct AssembleOptions {
 ///       other parameters of a general step as far as they vary
 ///   jump: length, and height and turn as far as they vary
 ///
+/// A group has at most one parameter per three examples, besides start_z, end_z, length and the
+/// heights. Heights that vary are always parameters. If there are too few examples for that, the
+/// general group is omitted, and only jumps to one height are kept. Otherwise, blends of climbing
+/// and level examples would sink into level ground.
+///
 /// A group without examples of its own is omitted. So are straight or level groups with fewer than
 /// three steps, which span no area, if another group contains those steps.
 ///
@@ -53,7 +58,8 @@ class LibraryAssembler {
   /// The results in the order of Add.
   [[nodiscard]] std::span<const Extraction> files() const { return files_; }
 
-  /// Error: kNotFound if no capture contains a usable movement of the requested kinds.
+  /// Error: kNotFound if no capture contains a usable movement of the requested kinds, or only
+  /// climbing steps that are too few for a group.
   [[nodiscard]] Expected<RawLibrary> Assemble() const;
 
  private:

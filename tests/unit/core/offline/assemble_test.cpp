@@ -103,6 +103,59 @@ TEST(LibraryAssembler, StairsGiveGroupsWithHeight) {
                           "step_right 14: start_y_m start_z_m end_y_m end_z_m"));
 }
 
+// One walk over stairs has too few steps of each foot for the height parameters. Its climbing steps
+// must not be blended with level ones.
+TEST(LibraryAssembler, FewClimbingStepsAreLeftOut) {
+  LibraryAssembler assembler;
+  assembler.Add(StairWalk());
+  assembler.Add(PlainWalk());
+  std::size_t level = 0;
+  std::size_t all = 0;
+  for (const Extraction& file : assembler.files()) {
+    for (const ExtractedExample& step : file.general_steps) {
+      ++all;
+      level += step.level ? 1 : 0;
+    }
+  }
+  ASSERT_GT(all, level);
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value()) << Describe(library.error());
+  ExpectWellFormed(*library);
+  for (const RawGroup& group : library->groups) {
+    const bool has_heights =
+        std::ranges::find(group.parameters, ParameterName::kEndY) != group.parameters.end() &&
+        std::ranges::find(group.parameters, ParameterName::kStartY) != group.parameters.end();
+    if (has_heights) {
+      EXPECT_GT(group.examples.size(), group.parameters.size());
+    } else {
+      EXPECT_LE(group.examples.size(), level);
+    }
+    for (const RawExample& example : group.examples) {
+      if (has_heights) continue;
+      // The root of a level step neither rises nor falls.
+      const std::vector<Vec3>& root = example.clip.root_positions_m;
+      EXPECT_NEAR(root.front().y, root.back().y, 0.05) << example.source;
+    }
+  }
+}
+
+TEST(LibraryAssembler, ClimbingStepsAloneNeedHeights) {
+  for (const int walks : {1, 3}) {
+    LibraryAssembler assembler;
+    for (int i = 0; i < walks; ++i) assembler.Add(StairWalk());
+    const Expected<RawLibrary> library = assembler.Assemble();
+    if (!library) continue;
+    for (const RawGroup& group : library->groups) {
+      const auto climbs = [](const RawExample& example) {
+        const std::vector<Vec3>& root = example.clip.root_positions_m;
+        return std::fabs(root.front().y - root.back().y) > 0.08;
+      };
+      if (std::ranges::none_of(group.examples, climbs)) continue;
+      EXPECT_NE(std::ranges::find(group.parameters, ParameterName::kEndY), group.parameters.end());
+    }
+  }
+}
+
 TEST(LibraryAssembler, ExtractsOnlyTheRequestedKinds) {
   AssembleOptions options;
   options.steps = false;
