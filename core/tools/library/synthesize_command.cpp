@@ -134,6 +134,7 @@ int RunSynthesize(const SynthesizeCommand& command) {
            {"missed_rad", unreachable.missed.turn_rad}});
     }
     json["refusals"] = RefusalsToJson(refusals);
+    json["stop_reason"] = synthesis->stop_reason;
     std::printf("%s\n", Dump(json).c_str());
     return kExitSuccess;
   }
@@ -146,6 +147,9 @@ int RunSynthesize(const SynthesizeCommand& command) {
   for (const Refusal& refusal : refusals) {
     const auto request = static_cast<unsigned long long>(refusal.request_id - 1);
     std::printf("; movements[%llu] %s", request, refusal.reason.c_str());
+  }
+  if (!synthesis->stop_reason.empty()) {
+    std::printf("; the feet are apart at the end: %s", synthesis->stop_reason.c_str());
   }
   std::printf("\n");
   return kExitSuccess;

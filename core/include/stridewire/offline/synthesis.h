@@ -83,6 +83,8 @@ struct Synthesis {
   std::vector<MovementRecord> movements;
   std::vector<WalkRecord> walks;
   std::vector<UnreachableFootprint> unreachable_footprints;
+  /// Why the feet are apart at the end of the choreography; empty if they are together.
+  std::string stop_reason;
 };
 
 inline constexpr int kMaxSynthesisFrames = 1 << 20;  ///< Longest result of Synthesize.

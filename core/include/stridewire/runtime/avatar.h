@@ -51,7 +51,8 @@ struct AvatarEvent {
   Vec3 position_m = Vec3(0.0f);  ///< kFootStrike: ball of that foot, in the world.
   BaseFrame base;                ///< kFinished: base frame after the movement.
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
-  /// kRejected: reason as one sentence in static storage.
+  /// In static storage. kRejected: reason as one sentence. kIdle, and kStarted of a stand: the
+  /// reason why the feet are still apart; empty if they are together.
   const char* reason = "";
   /// kRejected: set only if the request was a step to a footprint.
   std::optional<FootprintError> missed;

@@ -249,6 +249,7 @@ Expected<Synthesis> Synthesize(const SynthesisInput& input) {
           return std::unexpected(status.error());
         }
       }
+      if (event.type == AvatarEventType::kIdle) result.stop_reason = event.reason;
       if (event.type == AvatarEventType::kStarted) {
         requested.emplace_back();
         MovementRecord record;

@@ -14,10 +14,6 @@
 namespace stridewire {
 namespace {
 
-// After a long stride, one step may not suffice to bring the feet together. A second step must
-// bring them closer by at least this much.
-constexpr double kClosingGainM = 0.03;
-
 // A movement can add up to this many events in one tick: started, two foot strikes, finished, the
 // end of a walk or a rejection, and the start of the next movement.
 constexpr std::size_t kEventReserve = 7;
@@ -283,13 +279,6 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   change_.idle_changed = idle() != std::exchange(was_idle_, idle());
 }
 
-bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
-  const int end_z = body_.library->group(plan.group).FindParameter(ParameterName::kEndZ);
-  if (end_z < 0) return false;
-  return std::fabs(plan.applied.values[static_cast<std::size_t>(end_z)]) <
-         std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
-}
-
 bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   STRIDEWIRE_CHECK(!is_moving_ && !is_in_stand_);
   interrupts_ = false;
@@ -299,15 +288,14 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
     // The walk ends here. Bring the feet together, so that the avatar does not stop in mid-stride.
     is_walking_ = false;
     SwitchPlanting();
-    const auto plan = PlanStep(*body_.library, StepRequest{}, feet_, last_moved_, false);
-    if (plan && (inserted_steps_ == 0 || BringsFeetTogether(*plan))) {
+    if (const auto plan = PlanClosingStep()) {
       StartInserted(*plan, scratch);
       return true;
     }
   }
   if (is_empty) {
     if (!std::exchange(is_idle_reported_, true)) {
-      AddEvent({.type = AvatarEventType::kIdle, .base = base_});
+      AddEvent({.type = AvatarEventType::kIdle, .base = base_, .reason = WhyFeetAreApart()});
     }
     last_group_ = body_.library->groups().size();
     return false;
@@ -325,7 +313,9 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
     is_in_stand_ = true;
     stand_left_s_ = stand->seconds;
     request_id_ = PopQueue();
-    AddEvent({.type = AvatarEventType::kStarted, .request_id = request_id_});
+    AddEvent({.type = AvatarEventType::kStarted,
+              .request_id = request_id_,
+              .reason = WhyFeetAreApart()});
     return true;
   }
   StartTransitionPath(scratch);
@@ -382,6 +372,7 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
   stance.vector = feet_;
   stance.last_step_s = is_walking_ ? body_.movement.duration_s() : 0.0;
   stance.is_exact = body_.plants_feet;
+  stance.is_aimed = walk_.is_aimed;
   const WalkDecision decision =
       PlanWalkStep(*body_.library, options_.terrain.get(),
                    std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);

@@ -188,7 +188,9 @@ class AvatarSimulation {
   [[nodiscard]] double NextEventTime() const;
   void AdvanceEventfully(double dt_s, PlanScratch& scratch);
   void PrefetchState() const;
-  [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
+  [[nodiscard]] std::optional<RequestPlan> PlanClosingStep() const;
+  [[nodiscard]] std::optional<RequestPlan> PlanPlantedClosingStep(Foot foot) const;
+  [[nodiscard]] const char* WhyFeetAreApart() const;
   [[nodiscard]] bool StartNext(PlanScratch& scratch);
   void StartWalkStep(PlanScratch& scratch);
   void StartTransitionPath(PlanScratch& scratch);

@@ -17,6 +17,65 @@ constexpr double kMaxComfortableM = 0.62;
 constexpr double kStrideM = 0.3;
 constexpr double kStraightRad = 0.2;
 constexpr double kLeastWidthM = 0.08;
+// Examples whose feet differ by at most this height are level.
+constexpr double kLevelM = 0.05;
+
+// Ranges of the level steps of a library.
+struct StepRanges {
+  double longest_m = 0.0;
+  double back_m = 0.0;
+  // [foot]: shortest step forward; infinity if the foot has no step.
+  std::array<double, 2> shortest_m{HUGE_VAL, HUGE_VAL};
+  double narrowest_m = HUGE_VAL;
+  double width_sum_m = 0.0;
+  int widths = 0;
+};
+
+void AddGroup(const MotionGroup& group, StepRanges& ranges) {
+  const int end_z = group.FindParameter(ParameterName::kEndZ);
+  const int turn = group.FindParameter(ParameterName::kTurn);
+  const int end_x = group.FindParameter(ParameterName::kEndX);
+  const int start_x = group.FindParameter(ParameterName::kStartX);
+  const int heights[] = {group.FindParameter(ParameterName::kStartY),
+                         group.FindParameter(ParameterName::kEndY)};
+  const int x = end_x >= 0 ? end_x : start_x;
+  const Foot foot = MovingFoot(group.kind);
+  const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+  double& shortest_m = ranges.shortest_m[static_cast<std::size_t>(foot)];
+  for (int s = 0; s < group.example_count; ++s) {
+    const auto site = group.site(s);
+    const auto is_uneven = [&](int l) {
+      return l >= 0 && std::fabs(site[static_cast<std::size_t>(l)]) > kLevelM;
+    };
+    if (is_uneven(heights[0]) || is_uneven(heights[1])) continue;
+    const double length_m = site[static_cast<std::size_t>(end_z)];
+    ranges.longest_m = std::max(ranges.longest_m, length_m);
+    ranges.back_m = std::max(ranges.back_m, -length_m);
+    shortest_m = std::min(shortest_m, std::max(length_m, 0.0));
+    if (x < 0) continue;
+    const double side_m = outward * site[static_cast<std::size_t>(x)];
+    if (length_m < kStrideM || side_m < kLeastWidthM) continue;
+    if (turn >= 0 && std::fabs(site[static_cast<std::size_t>(turn)]) > kStraightRad) continue;
+    ranges.narrowest_m = std::min(ranges.narrowest_m, side_m);
+    ranges.width_sum_m += side_m;
+    ++ranges.widths;
+  }
+}
+
+// Returns the ranges of the groups for level ground. If there are none, returns those of the level
+// examples in the groups for uneven ground.
+StepRanges RangesOf(const MotionLibrary& library) {
+  StepRanges ranges;
+  for (const bool is_uneven : {false, true}) {
+    for (const MotionGroup& group : library.groups()) {
+      if (!IsStep(group.kind) || group.FindParameter(ParameterName::kEndZ) < 0) continue;
+      if ((group.FindParameter(ParameterName::kEndY) >= 0) != is_uneven) continue;
+      AddGroup(group, ranges);
+    }
+    if (ranges.longest_m > 0.0) break;
+  }
+  return ranges;
+}
 
 }  // namespace
 
@@ -29,43 +88,29 @@ LocomotionProfile MakeLocomotionProfile(const MotionLibrary& library) {
     ball.y = 0.0;
     profile.stand_feet_m[static_cast<std::size_t>(foot)] = ball;
   }
-  profile.stand_m = std::max(profile.stand_feet_m[0].x - profile.stand_feet_m[1].x, kLeastWidthM);
+  const std::array<DVec3, 2>& feet = profile.stand_feet_m;
+  profile.stand_m = std::max(feet[0].x - feet[1].x, kLeastWidthM);
+  profile.stands_in_stride = std::fabs(feet[0].z - feet[1].z) > kFeetApartForwardM;
 
-  double longest_m = 0.0;
-  double back_m = 0.0;
-  double width_m = 0.0;
-  int widths = 0;
-  double narrowest_m = profile.stand_m;
-  for (const MotionGroup& group : library.groups()) {
-    if (!IsStep(group.kind)) continue;
-    const int end_z = group.FindParameter(ParameterName::kEndZ);
-    const int turn = group.FindParameter(ParameterName::kTurn);
-    const int end_y = group.FindParameter(ParameterName::kEndY);
-    const int end_x = group.FindParameter(ParameterName::kEndX);
-    const int start_x = group.FindParameter(ParameterName::kStartX);
-    if (end_z < 0 || end_y >= 0) continue;
-    longest_m = std::max(longest_m, group.parameters[static_cast<std::size_t>(end_z)].max);
-    back_m = std::max(back_m, -group.parameters[static_cast<std::size_t>(end_z)].min);
-    const int x = end_x >= 0 ? end_x : start_x;
-    if (x < 0) continue;
-    const double outward = MovingFoot(group.kind) == Foot::kLeft ? 1.0 : -1.0;
-    for (int s = 0; s < group.example_count; ++s) {
-      const auto site = group.site(s);
-      const double side_m = outward * site[static_cast<std::size_t>(x)];
-      if (site[static_cast<std::size_t>(end_z)] < kStrideM || side_m < kLeastWidthM) continue;
-      if (turn >= 0 && std::fabs(site[static_cast<std::size_t>(turn)]) > kStraightRad) continue;
-      narrowest_m = std::min(narrowest_m, side_m);
-      width_m += side_m;
-      ++widths;
-    }
+  profile.has_climbs = std::ranges::any_of(library.groups(), [](const MotionGroup& group) {
+    return IsStep(group.kind) && group.FindParameter(ParameterName::kEndY) >= 0;
+  });
+
+  const StepRanges ranges = RangesOf(library);
+  if (ranges.longest_m > 0.0) {
+    profile.longest_m = ranges.longest_m;
+    profile.shortest_m =
+        std::min(std::max(ranges.shortest_m[0], ranges.shortest_m[1]), ranges.longest_m);
+    profile.step_m = std::max(std::min(kComfortablePart * ranges.longest_m, kMaxComfortableM),
+                              profile.shortest_m);
   }
-  if (longest_m > 0.0) {
-    profile.longest_m = longest_m;
-    profile.step_m = std::min(kComfortablePart * longest_m, kMaxComfortableM);
+  profile.back_m = 0.75 * ranges.back_m;
+  profile.width_m = 0.7 * profile.stand_m;
+  if (ranges.widths > 0) {
+    const double narrowest_m = std::min(ranges.narrowest_m, profile.stand_m);
+    const double mean_m = std::min(ranges.width_sum_m / ranges.widths, profile.stand_m);
+    profile.width_m = 0.5 * (narrowest_m + mean_m);
   }
-  profile.back_m = 0.75 * back_m;
-  if (widths > 0) width_m = std::min(width_m / widths, profile.stand_m);
-  profile.width_m = widths > 0 ? 0.5 * (narrowest_m + width_m) : 0.7 * profile.stand_m;
   profile.width_m = std::min(profile.width_m, profile.stand_m);
   return profile;
 }

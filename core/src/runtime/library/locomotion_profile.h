@@ -3,21 +3,36 @@
 #include <array>
 
 #include "stridewire/base/math.h"
+#include "stridewire/runtime/skeleton.h"
 
 namespace stridewire {
 
 class MotionLibrary;
+
+/// Feet are apart if one is further ahead of the other than this, compared with the stand.
+inline constexpr double kFeetApartForwardM = 0.12;
 
 /// Typical steps of a library, derived from its examples. Walks use them unless the request says
 /// otherwise.
 struct LocomotionProfile {
   double step_m = 0.5;     ///< Comfortable step forward, from foot to foot.
   double longest_m = 0.6;  ///< Longest step forward.
-  double back_m = 0.0;     ///< Longest comfortable step backward.
-  double width_m = 0.15;   ///< Sideways distance between the feet in a straight walk.
-  double stand_m = 0.2;    ///< Sideways distance between the feet in the stand pose.
+  /// Shortest step forward that both feet have; at most step_m. 0 if both can close.
+  double shortest_m = 0.0;
+  double back_m = 0.0;    ///< Longest comfortable step backward.
+  double width_m = 0.15;  ///< Sideways distance between the feet in a straight walk.
+  double stand_m = 0.2;   ///< Sideways distance between the feet in the stand pose.
   /// [foot]: position of the foot in the stand pose, relative to the base frame.
   std::array<DVec3, 2> stand_feet_m{};
+  /// True if the stand pose has one foot more than 0.12 m ahead of the other, because the captures
+  /// contain no stand. A walk then begins and ends in a stride.
+  bool stands_in_stride = false;
+  bool has_climbs = false;  ///< Some group of steps has the parameter end_y.
+
+  /// Returns the foot that stands behind in the stand pose.
+  [[nodiscard]] Foot RearFoot() const {
+    return stand_feet_m[0].z <= stand_feet_m[1].z ? Foot::kLeft : Foot::kRight;
+  }
 };
 
 /// Derives the profile of a library whose groups and stand pose are loaded. MotionLibrary stores

@@ -43,6 +43,11 @@ struct RequestPlan {
 /// accuracy.
 inline constexpr double kHullGrowth = 0.1;
 
+/// Largest distance between the end of a library's step and a footprint beside the other foot, or
+/// at the goal of a walk, that planting may distribute over the swing. Libraries without steps in
+/// place can only close their feet and turn on the spot in this way.
+inline constexpr double kMaxPlantedErrorM = 0.6;
+
 /// Plans a step in the group that spans it best, with parameters clamped to its hull. The start,
 /// which is given by the feet, has a larger weight than the end. A requested value (turn, side,
 /// height) for which a group has no parameter counts as missed. If the request does not name a

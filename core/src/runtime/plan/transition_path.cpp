@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "runtime/library/locomotion_profile.h"
 #include "runtime/library/transition.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {
 namespace {
 
-constexpr double kFeetApartForwardM = 0.12;
 constexpr double kFeetApartAsideM = 0.3;
 
 // Captured movements that fit together have a transition distance of up to 0.125 m. A stride and a

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "base/check.h"
 #include "base/trig.h"
+#include "runtime/library/contact_keytimes.h"
 #include "runtime/library/locomotion_profile.h"
 #include "runtime/plan/foot_planner.h"
 #include "runtime/plan/walk_steering.h"
@@ -21,10 +23,18 @@ constexpr double kRoughlyArrivedM = 0.15;
 constexpr double kRoughlyArrivedRad = 0.25;
 
 // Largest distance between the library's own step and the footprint, which planting distributes
-// over the swing. The larger limit applies to small steps and to the second attempt, because
-// libraries without steps in place have to turn and close with the steps they have.
+// over the swing. kMaxPlantedErrorM applies to small steps and to steps that were chosen by
+// comparison. Such a step costs kErrorWeight for each metre beyond the smaller limit.
 constexpr double kMaxErrorM = 0.16;
-constexpr double kMaxLooseErrorM = 0.6;
+constexpr double kErrorWeight = 0.25;
+// Largest difference in height, for libraries that have climbing steps.
+constexpr double kMaxErrorHeightM = 0.08;
+// The same for the heading of the body after the step, which planting cannot change.
+constexpr double kMaxErrorRad = 0.015;
+constexpr double kMaxLooseErrorRad = 0.5;
+// These limits apply when looking ahead. The next step itself may exceed them a little, because
+// feet do not land exactly as predicted.
+constexpr double kSlack = 1.05;
 // A step that goes no further forward than this ends with the body above both feet.
 constexpr double kForwardM = 0.2;
 
@@ -35,6 +45,22 @@ constexpr double kHighestRiseM = 0.04;
 // An obstacle along a swing may be at most this much higher than both ends of the swing.
 constexpr double kMaxHurdleM = 0.25;
 constexpr double kHurdleRadiusM = 0.06;
+
+// To compare steps, efforts and costs are added, in metres (WalkSteering::EffortM).
+// Share of the effort after the first step, beside that after both steps. Otherwise, the walk could
+// put off its progress for ever.
+constexpr double kFirstWeight = 0.2;
+// Cost of a metre that the body moves, so that the walk turns in place rather than in a wide curve.
+constexpr double kPathWeight = 0.15;
+// Cost of a step without progress.
+constexpr double kIdleStepM = 0.1;
+// Cost of a step after which the other foot cannot continue.
+constexpr double kDeadEndM = 1.0;
+// Cost of arriving with another heading, per radian. It is more than the effort of a turn, so that
+// the walk continues if the library can turn further.
+constexpr double kMissWeight = 0.6;
+// Expected duration of a step, to look ahead.
+constexpr double kExpectedStepS = 0.6;
 
 // Radii of the rings of eight alternative footprints around the desired one, closest first.
 constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
@@ -48,54 +74,87 @@ constexpr std::array<double, 10> kRoomShiftsM{-0.015, 0.015, -0.03, 0.03,   -0.0
 // After this many alternatives that the library cannot reach, the step is given up.
 constexpr int kMaxOutOfReach = 3;
 
-// Variations of a step to try in turn: shorter steps, then steps towards either side.
-struct Attempt {
+// Variations of the step towards the goal: shorter steps, and steps towards either side.
+struct Variation {
   double part;      // Fraction of the full step length.
   double bend_rad;  // Change of the walking direction, left positive.
 };
-constexpr std::array<Attempt, 11> kAttempts{{{1.0, 0.0},
-                                             {0.75, 0.0},
-                                             {0.5, 0.0},
-                                             {1.0, 0.5},
-                                             {1.0, -0.5},
-                                             {0.7, 0.9},
-                                             {0.7, -0.9},
-                                             {0.3, 0.0},
-                                             {0.6, 1.4},
-                                             {0.6, -1.4},
-                                             {0.15, 0.0}}};
+constexpr std::array<Variation, 11> kVariations{{{1.0, 0.0},
+                                                 {0.75, 0.0},
+                                                 {0.5, 0.0},
+                                                 {1.0, 0.5},
+                                                 {1.0, -0.5},
+                                                 {0.7, 0.9},
+                                                 {0.7, -0.9},
+                                                 {0.3, 0.0},
+                                                 {0.6, 1.4},
+                                                 {0.6, -1.4},
+                                                 {0.15, 0.0}}};
+// Turns of comfortable steps, which do not depend on the goal.
+constexpr std::array<double, 5> kComfortableTurnsRad{0.0, 0.3, -0.3, 0.6, -0.6};
+
+// Turns of steps in place.
+constexpr std::array<double, 2> kPivotTurnsRad{0.6, -0.6};
 
 // Within this distance the ground at the goal is checked again, because it may have changed.
 constexpr double kGoalInSightM = 1.5;
 
-// A walk makes progress if its remaining distance shrinks by kProgressM. A radian of remaining turn
-// counts as kMetresPerRadianLeft.
+// A walk makes progress if its remaining effort shrinks by this much.
 constexpr double kProgressM = 0.02;
-constexpr double kMetresPerRadianLeft = 0.3;
+
+// Returns the change of heading that a group's step produces without an extra turn. Groups without
+// a turn parameter turn by what their examples turn on average, weighted by the distance from them.
+double NaturalTurn(const MotionGroup& group, const ParameterValues& values) {
+  const int turn = group.FindParameter(ParameterName::kTurn);
+  if (turn >= 0) return values.values[static_cast<std::size_t>(turn)];
+  double sum_rad = 0.0;
+  double weights = 0.0;
+  for (int s = 0; s < group.example_count; ++s) {
+    const auto site = group.site(s);
+    double squared = 1e-6;  // So that the weight of an example at this place is finite.
+    for (std::size_t l = 0; l < site.size(); ++l) {
+      const double away = (values.values[l] - site[l]) / group.parameters[l].scale;
+      squared += away * away;
+    }
+    weights += 1.0 / squared;
+    sum_rad += group.heading_change_rad[static_cast<std::size_t>(s)] / squared;
+  }
+  return sum_rad / weights;
+}
+
+// A step that the library has, and where it leads.
+struct PlannedStep {
+  RequestPlan plan;
+  Foot moved = Foot::kLeft;
+  Footprint print;
+  double heading_rad = 0.0;  // Heading of the body after the step.
+  double error_m = 0.0;      // Distance that planting distributes over the swing.
+  bool is_last = false;      // The step is aimed at the foot's place at the goal.
+};
 
 class StepPlanner {
  public:
-  StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance)
+  // To look ahead, `checks_ground` is false: every place is accepted at the height of the ground.
+  StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance,
+              bool checks_ground)
       : library_(library),
         profile_(library.locomotion_profile()),
         terrain_(terrain),
-        stance_(stance) {}
+        stance_(stance),
+        checks_ground_(checks_ground) {}
 
-  void Begin(bool is_strict) {
-    is_strict_ = is_strict;
-    candidates_ = 0;
-  }
-
-  // Plans a step of a foot. Returns nullopt if the library has no such step onto suitable ground.
-  std::optional<RequestPlan> Plan(Foot moving, const WalkStep& step) {
+  // Plans a step of a foot. Returns nullopt if the library has no such step onto suitable ground. A
+  // strict plan needs little correction by planting.
+  std::optional<PlannedStep> Plan(Foot moving, const WalkStep& step, bool is_strict) {
     moving_ = moving;
+    is_strict_ = is_strict;
     outward_ = moving == Foot::kLeft ? 1.0 : -1.0;
     fixed_m_ = stance_.feet[static_cast<std::size_t>(OtherFoot(moving))].position_m;
     Footprint wanted{step.print.position_m,
                      UnwrapAngle(step.print.heading_rad, stance_.heading_rad)};
-    if (terrain_ == nullptr) return PlanExactStep(Level(wanted), step.root_m);
+    if (terrain_ == nullptr) return PlanExactStep(Level(wanted), step);
     if (!step.is_last) wanted = WithRoom(wanted);
-    if (IsGood(wanted)) return PlanExactStep(OnGround(wanted), step.root_m);
+    if (!checks_ground_ || IsGood(wanted)) return PlanExactStep(OnGround(wanted), step);
     if (step.is_last) return std::nullopt;
     int out_of_reach = 0;
     for (const double ring_m : kRingsM) {
@@ -108,11 +167,25 @@ class StepPlanner {
         print.position_m += RotateYaw(way, DVec3(0.0, 0.0, ring_m));
         print = WithRoom(print);
         if (!KeepsApart(print) || !IsGood(print)) continue;
-        if (auto plan = PlanExactStep(OnGround(print), step.root_m)) return plan;
+        if (auto plan = PlanExactStep(OnGround(print), step)) return plan;
         if (++out_of_reach >= kMaxOutOfReach) return std::nullopt;
       }
     }
     return std::nullopt;
+  }
+
+  // Returns the step with its footprint turned about the standing foot, so that the foot has the
+  // heading that the body gets.
+  [[nodiscard]] WalkStep TurnedWith(const PlannedStep& planned) const {
+    WalkStep step;
+    const double turn_rad = planned.heading_rad - planned.print.heading_rad;
+    step.print.position_m = fixed_m_ + RotateYaw(turn_rad, planned.print.position_m - fixed_m_);
+    step.print.heading_rad = planned.heading_rad;
+    step.root_m = fixed_m_;
+    if (planned.plan.root_m) {
+      step.root_m += RotateYaw(turn_rad, *planned.plan.root_m - fixed_m_);
+    }
+    return step;
   }
 
   // Returns true if both feet can stand at their footprints at the goal.
@@ -205,10 +278,10 @@ class StepPlanner {
 
   // Plans the library's step to a footprint. Returns nullopt if the step misses the footprint by
   // more than planting can distribute over the swing.
-  std::optional<RequestPlan> PlanExactStep(const Footprint& print, const DVec3& root_m) const {
+  std::optional<PlannedStep> PlanExactStep(const Footprint& print, const WalkStep& step) const {
     auto plan =
         PlanFootprint(library_, moving_, print, fixed_m_, stance_.heading_rad, stance_.vector);
-    if (!plan) return plan;
+    if (!plan) return std::nullopt;
     const MotionGroup& group = library_.group(plan->group);
     const DVec3 wanted = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);
     const auto applied_or = [&](ParameterName name, double otherwise) {
@@ -220,22 +293,37 @@ class StepPlanner {
         outward_ * std::clamp(outward_ * wanted.x, profile_.width_m, profile_.stand_m);
     const double error_x = applied_or(ParameterName::kEndX, natural_x) - wanted.x;
     const double error_z = applied_or(ParameterName::kEndZ, 0.0) - wanted.z;
-    const double error_rad = std::fabs(applied_or(ParameterName::kTurn, 0.0) -
-                                       (print.heading_rad - stance_.heading_rad));
-    if (std::sqrt(error_x * error_x + error_z * error_z) >
-            (strides && is_strict_ ? kMaxErrorM : kMaxLooseErrorM) ||
-        error_rad > kMaxExtraTurnRad) {
+    const double error_m = std::sqrt(error_x * error_x + error_z * error_z);
+    const double wanted_rad = print.heading_rad - stance_.heading_rad;
+    const double natural_rad = NaturalTurn(group, plan->applied);
+    const double turn_rad =
+        std::clamp(wanted_rad, natural_rad - kMaxExtraTurnRad, natural_rad + kMaxExtraTurnRad);
+    // A library with climbing steps need not land on another height with a level step.
+    const double error_y = applied_or(ParameterName::kEndY, 0.0) - GroundRise(wanted.y);
+    if (is_strict_ && profile_.has_climbs && std::fabs(error_y) > kMaxErrorHeightM) {
       return std::nullopt;
     }
-    plan->most_residual_m = kMaxLooseErrorM;
-    if (!strides) plan->root_m = root_m;
-    return plan;
+    const double reach = checks_ground_ ? kSlack : 1.0;
+    if (error_m > reach * (strides && is_strict_ ? kMaxErrorM : kMaxPlantedErrorM) ||
+        std::fabs(turn_rad - wanted_rad) >
+            reach * (is_strict_ ? kMaxErrorRad : kMaxLooseErrorRad)) {
+      return std::nullopt;
+    }
+    plan->most_residual_m = reach * kMaxPlantedErrorM;
+    if (!strides || step.is_last) plan->root_m = step.root_m;
+    return PlannedStep{.plan = *plan,
+                       .moved = moving_,
+                       .print = print,
+                       .heading_rad = stance_.heading_rad + turn_rad,
+                       .error_m = error_m,
+                       .is_last = step.is_last};
   }
 
   const MotionLibrary& library_;
   const LocomotionProfile& profile_;
   const Terrain* terrain_;
   const WalkStance& stance_;
+  bool checks_ground_;
   Foot moving_ = Foot::kLeft;
   double outward_ = 1.0;
   DVec3 fixed_m_ = DVec3(0.0);
@@ -244,6 +332,156 @@ class StepPlanner {
   bool has_seen_bad_ground_ = false;
   bool has_seen_heights_ = false;
 };
+
+WalkStance After(const WalkStance& stance, const PlannedStep& step) {
+  WalkStance after = stance;
+  after.feet[static_cast<std::size_t>(step.moved)] = step.print;
+  after.heading_rad = step.heading_rad;
+  after.last_moved = step.moved;
+  after.vector.left_from_right_m =
+      RotateYaw(-step.heading_rad, after.feet[0].position_m - after.feet[1].position_m);
+  after.last_step_s = kExpectedStepS;
+  after.is_aimed[static_cast<std::size_t>(step.moved)] = step.is_last;
+  return after;
+}
+
+// Compares steps by the effort that remains after them and after the next step of the other foot.
+class StepComparison {
+ public:
+  StepComparison(const MotionLibrary& library, const Terrain* terrain, const WalkRequest& walk,
+                 std::size_t next_waypoint, double effort_m)
+      : library_(library),
+        terrain_(terrain),
+        walk_(walk),
+        next_waypoint_(next_waypoint),
+        effort_m_(effort_m) {}
+
+  // Compares a step with the best one so far.
+  void Consider(StepPlanner& planner, const WalkStance& stance, Foot moving, const WalkStep& step) {
+    const auto planned = PlanTurned(planner, moving, step);
+    if (!planned) return;
+    const double score_m = ScoreM(stance, *planned);
+    if (score_m >= best_m_) return;
+    best_m_ = score_m;
+    best_ = planned;
+  }
+  // Returns true if the walk makes progress with this step, or with it and the next one. A foot may
+  // take its place at the goal only if the other foot can follow.
+  [[nodiscard]] bool LeadsOn(const WalkStance& stance, const PlannedStep& step) const {
+    const LocomotionProfile& profile = library_.locomotion_profile();
+    const WalkStance after = After(stance, step);
+    const WalkSteering steering(profile, walk_, after);
+    if (HasArrived(steering)) return MissCostM(after) < kProgressM;
+    if (!step.is_last && steering.EffortM(step.moved, next_waypoint_) < effort_m_ - kProgressM) {
+      return true;
+    }
+    const auto second = NextStep(steering, after, OtherFoot(step.moved));
+    if (!second) return false;
+    const WalkStance last = After(after, *second);
+    const WalkSteering last_steering(profile, walk_, last);
+    return HasArrived(last_steering) ||
+           last_steering.EffortM(second->moved, next_waypoint_) + ErrorCostM(*second) <
+               effort_m_ - kProgressM;
+  }
+  [[nodiscard]] const std::optional<PlannedStep>& best() const { return best_; }
+
+ private:
+  // Plans a step. If the body turns less or more than wanted, the footprint turns with it.
+  static std::optional<PlannedStep> PlanTurned(StepPlanner& planner, Foot moving,
+                                               const WalkStep& step) {
+    if (planner.is_exhausted()) return std::nullopt;
+    auto planned = planner.Plan(moving, step, false);
+    if (planned && !step.is_last && planned->heading_rad != planned->print.heading_rad) {
+      planned = planner.Plan(moving, planner.TurnedWith(*planned), false);
+    }
+    return planned;
+  }
+
+  [[nodiscard]] double ScoreM(const WalkStance& stance, const PlannedStep& first) const {
+    const LocomotionProfile& profile = library_.locomotion_profile();
+    double score_m = ErrorCostM(first);
+    const WalkStance after = After(stance, first);
+    const WalkSteering steering(profile, walk_, after);
+    const double first_effort_m = steering.EffortM(first.moved, next_waypoint_);
+    score_m += kFirstWeight * first_effort_m + kPathWeight * steering.BodiesApartM();
+    if (first_effort_m > effort_m_ - kProgressM) score_m += kIdleStepM;
+    if (HasArrived(steering)) return score_m + MissCostM(after);
+    const Foot other = OtherFoot(first.moved);
+    const auto second = NextStep(steering, after, other);
+    if (!second) return score_m + first_effort_m + kDeadEndM;
+    score_m += ErrorCostM(*second);
+    const WalkStance last = After(after, *second);
+    const WalkSteering last_steering(profile, walk_, last);
+    if (HasArrived(last_steering)) return score_m + MissCostM(last);
+    return score_m + last_steering.EffortM(other, next_waypoint_);
+  }
+
+  [[nodiscard]] std::optional<PlannedStep> NextStep(const WalkSteering& steering,
+                                                    const WalkStance& stance, Foot moving) const {
+    StepPlanner planner(library_, terrain_, stance, false);
+    return PlanTurned(planner, moving, steering.NextStep(moving, next_waypoint_, 1.0, 0.0));
+  }
+  [[nodiscard]] bool HasArrived(const WalkSteering& steering) const {
+    return next_waypoint_ >= walk_.waypoints_m.size() && steering.IsCloseToGoal();
+  }
+  [[nodiscard]] double MissCostM(const WalkStance& arrived) const {
+    return kMissWeight * std::fabs(WrapAngle(arrived.heading_rad - walk_.heading_rad));
+  }
+  static double ErrorCostM(const PlannedStep& step) {
+    return kErrorWeight * std::max(0.0, step.error_m - kMaxErrorM);
+  }
+
+  const MotionLibrary& library_;
+  const Terrain* terrain_;
+  const WalkRequest& walk_;
+  std::size_t next_waypoint_;
+  double effort_m_;  // Before the step.
+  std::optional<PlannedStep> best_;
+  double best_m_ = HUGE_VAL;
+};
+
+// Returns a step in place that turns the body closer to the heading of the goal. Returns nullopt if
+// the library has none.
+std::optional<PlannedStep> TurnAtGoal(StepPlanner& planner, const WalkStance& stance,
+                                      const WalkRequest& walk, const WalkSteering& steering) {
+  const auto miss_rad = [&](double heading_rad) {
+    return std::fabs(WrapAngle(heading_rad - walk.heading_rad));
+  };
+  for (const Foot foot : {OtherFoot(stance.last_moved), stance.last_moved}) {
+    auto planned = planner.Plan(foot, steering.StepToGoal(foot), true);
+    if (planned && miss_rad(planned->heading_rad) < miss_rad(stance.heading_rad) - kMaxErrorRad) {
+      return planned;
+    }
+  }
+  return std::nullopt;
+}
+
+// Returns the step that steering wants if the library has it. Otherwise, compares variations of it,
+// comfortable steps and steps in place.
+std::optional<PlannedStep> ChooseStep(StepPlanner& planner, StepComparison& comparison,
+                                      const WalkStance& stance, WalkSteering& steering,
+                                      std::size_t next_waypoint) {
+  const std::span<const Foot> feet = steering.FeetToMove(next_waypoint);
+  for (const Foot moving : feet) {
+    const WalkStep step = steering.NextStep(moving, next_waypoint, 1.0, 0.0);
+    const auto planned = planner.Plan(moving, step, true);
+    if (planned && comparison.LeadsOn(stance, *planned)) return planned;
+  }
+  for (const Foot moving : feet) {
+    const auto consider = [&](const WalkStep& step) {
+      comparison.Consider(planner, stance, moving, step);
+    };
+    for (const Variation& variation : kVariations) {
+      consider(steering.NextStep(moving, next_waypoint, variation.part, variation.bend_rad));
+    }
+    for (const double turn_rad : kComfortableTurnsRad) {
+      consider(steering.ComfortableStep(moving, turn_rad));
+    }
+    for (const double turn_rad : kPivotTurnsRad) consider(steering.Pivot(moving, turn_rad));
+    if (steering.IsGoalNear(moving, next_waypoint)) consider(steering.StepToGoal(moving));
+  }
+  return comparison.best();
+}
 
 WalkDecision Reject(const char* reason) {
   WalkDecision decision;
@@ -259,45 +497,48 @@ WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                           WalkProgress& progress) {
   STRIDEWIRE_CHECK(progress.next_waypoint <= walk.waypoints_m.size());
   STRIDEWIRE_CHECK(progress.steps >= 0 && progress.steps <= kMaxWalkSteps);
-  STRIDEWIRE_CHECK(progress.steps_without >= 0 && progress.steps_without <= kMaxStepsWithout);
   WalkSteering steering(library.locomotion_profile(), walk, stance);
+  const std::size_t waypoint_before = progress.next_waypoint;
   steering.PassWaypoints(progress.next_waypoint);
   const double arrived_m = stance.is_exact ? kArrivedM : kRoughlyArrivedM;
   const double arrived_rad = stance.is_exact ? kArrivedRad : kRoughlyArrivedRad;
   const bool is_last_leg = progress.next_waypoint >= walk.waypoints_m.size();
   if (is_last_leg && steering.HasArrived(arrived_m, arrived_rad)) return {};
 
-  const double left =
-      steering.RemainingM(progress.next_waypoint) + kMetresPerRadianLeft * steering.RemainingRad();
-  if (left < progress.least_left - kProgressM) {
-    progress.least_left = left;
+  const bool is_close = is_last_leg && steering.IsCloseToGoal();
+  const double effort_m = steering.EffortM(stance.last_moved, progress.next_waypoint);
+  if (effort_m < progress.least_effort_m - kProgressM ||
+      progress.next_waypoint != waypoint_before) {
+    progress.least_effort_m = effort_m;
     progress.steps_without = 0;
-  } else if (++progress.steps_without > kMaxStepsWithout) {
-    return Reject("the walk makes no progress towards its goal");
+  } else if (++progress.steps_without >=
+             (progress.is_detour ? kMaxDetourSteps : kMaxStepsWithout)) {
+    if (is_close) return {};
+    return Reject(progress.is_detour ? "the walk makes no progress towards its goal"
+                                     : "the library has no step that leads closer to the goal");
   }
   if (++progress.steps > kMaxWalkSteps) {
     return Reject("the walk needs more than 10000 steps");
   }
 
-  StepPlanner planner(library, terrain, stance);
+  StepPlanner planner(library, terrain, stance, true);
   const bool checks_goal =
-      terrain != nullptr && (progress.steps == 1 || (is_last_leg && left < kGoalInSightM));
+      terrain != nullptr && (progress.steps == 1 || (is_last_leg && effort_m < kGoalInSightM));
   if (checks_goal && !planner.GoalIsGood(steering)) {
     return Reject("the ground at the goal is too steep or too uneven to stand on");
   }
-  // First try steps that the library has, then steps that planting has to change much.
-  for (const bool is_strict : {true, false}) {
-    planner.Begin(is_strict);
-    for (const Attempt& attempt : kAttempts) {
-      for (const Foot moving : steering.FeetToMove(progress.next_waypoint)) {
-        const WalkStep step =
-            steering.NextStep(moving, progress.next_waypoint, attempt.part, attempt.bend_rad);
-        if (auto plan = planner.Plan(moving, step)) {
-          return {.outcome = WalkOutcome::kStep, .plan = *plan};
-        }
-      }
-      if (planner.is_exhausted()) break;
-    }
+  StepComparison comparison(library, terrain, walk, progress.next_waypoint, effort_m);
+  std::optional<PlannedStep> step;
+  if (is_close) {
+    step = TurnAtGoal(planner, stance, walk, steering);
+    if (!step) return {};
+  } else {
+    step = ChooseStep(planner, comparison, stance, steering, progress.next_waypoint);
+  }
+  if (planner.has_seen_bad_ground() || planner.has_seen_heights()) progress.is_detour = true;
+  if (step) {
+    progress.is_aimed[static_cast<std::size_t>(step->moved)] = step->is_last;
+    return {.outcome = WalkOutcome::kStep, .plan = step->plan};
   }
   if (planner.has_seen_heights()) {
     return Reject("the ground ahead is too high or too low to step on");

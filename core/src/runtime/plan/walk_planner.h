@@ -18,8 +18,10 @@ struct WalkStance {
   double heading_rad = 0.0;       ///< Heading of the body, unwrapped.
   Foot last_moved = Foot::kRight;
   FootState vector;          ///< Relative position of the feet, for PlanStep.
-  double last_step_s = 0.0;  ///< Duration of the previous step; 0 if there was none.
+  double last_step_s = 0.0;  ///< Duration of the previous step; 0 if the avatar does not walk.
   bool is_exact = true;  ///< Feet land exactly on their footprints; false without foot planting.
+  /// [foot]: the last step of this foot in the current walk was aimed at its place at the goal.
+  std::array<bool, 2> is_aimed{};
 };
 
 /// Progress of a walk. A new walk starts with a default value.
@@ -27,7 +29,11 @@ struct WalkProgress {
   std::size_t next_waypoint = 0;
   int steps = 0;
   int steps_without = 0;  ///< Number of steps since the walk last made progress.
-  double least_left = std::numeric_limits<double>::infinity();
+  /// Least remaining effort so far (WalkSteering::EffortM).
+  double least_effort_m = std::numeric_limits<double>::infinity();
+  bool is_detour = false;  ///< Ground that supports no foot has changed a step of this walk.
+  /// [foot]: the last step of this foot was aimed at its place at the goal.
+  std::array<bool, 2> is_aimed{};
 };
 
 enum class WalkOutcome : std::uint8_t { kStep, kArrived, kRefused };
@@ -39,21 +45,25 @@ struct WalkDecision {
   const char* reason = "";
 };
 
-/// Limits of a walk. It is rejected after kMaxStepsWithout steps without progress.
+/// Limits of a walk. It ends after kMaxStepsWithout steps without progress, or after
+/// kMaxDetourSteps if it makes a detour around ground that supports no foot.
 inline constexpr int kMaxWalkSteps = 10'000;
-inline constexpr int kMaxStepsWithout = 16;
+inline constexpr int kMaxStepsWithout = 2;
+inline constexpr int kMaxDetourSteps = 16;
 /// Footprints must be on ground whose normal has at least this y component (cosine of 20 degrees).
 inline constexpr double kLeastWalkNormalY = 0.9396926;
 /// Footprints may be at most this far above or below the standing foot.
 inline constexpr double kMaxWalkClimbM = 0.26;
-/// Largest number of footprints whose ground is checked per step, in each of two attempts.
+/// Largest number of footprints whose ground is checked per step.
 inline constexpr int kMaxWalkCandidates = 256;
 
 /// Plans the next step of a walk: towards the goal, with steps that the library has, onto ground
-/// that supports a foot. The remaining distance is divided into equal steps. Every decision is made
-/// for one step only, so a changed terrain or goal takes effect with the next step. Never
-/// allocates. The time is bounded by kMaxWalkCandidates ground checks and a few calls of PlanStep
-/// per attempt.
+/// that supports a foot. The remaining distance is divided into equal steps. If the library does
+/// not have the next of them, the planner compares shorter, longer and turning steps of either foot
+/// by the effort that remains after them. Every decision is made for one step only, so a changed
+/// terrain or goal takes effect with the next step. Never allocates. The time is bounded by
+/// kMaxWalkCandidates ground checks and, on level ground, 160 calls of PlanFootprint. Most steps of
+/// libraries with starts, stops and turns need one call.
 [[nodiscard]] WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                                         const WalkRequest& walk, const WalkStance& stance,
                                         WalkProgress& progress);

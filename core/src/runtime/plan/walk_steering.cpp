@@ -25,12 +25,28 @@ constexpr double kTogetherRad = 0.15;
 // A foot this close to its footprint at the goal is at the goal.
 constexpr double kAtGoalM = 1e-3;
 constexpr double kAtGoalRad = 2e-3;
+// The same tolerances after a step that was aimed at the goal. The library's steps may not turn
+// their feet or the body far enough.
+constexpr double kAimedM = 0.02;
+constexpr double kAimedRad = 0.5;
+constexpr double kAimedBodyRad = 0.25;
+
+// Effort of turning by one radian, in metres. Within kNearM of the goal the direction of the way
+// counts less, because the last steps lead in any direction.
+constexpr double kTurnEffort = 0.3;
+constexpr double kNearM = 0.5;
+// Effort of a metre sideways or backward.
+constexpr double kSideEffort = 1.5;
 
 // Goals further away than this are reached by walking, not by stepping sideways or backward.
 constexpr double kMaxShiftM = 1.3;
+// Goals closer than this are reached without turning towards them first.
+constexpr double kShuffleM = 0.15;
 constexpr double kSideStepM = 0.28;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
+// A library that only has strides steps sideways if that saves more than this many steps.
+constexpr double kStrideMargin = 0.5;
 
 // An avatar that faces away from its path by more than this turns on the spot first.
 constexpr double kSlowTurnRad = 0.7;
@@ -70,13 +86,22 @@ WalkSteering::WalkSteering(const LocomotionProfile& profile, const WalkRequest& 
     : profile_(profile), walk_(walk), stance_(stance) {
   goal_.position_m = walk.position_m;
   goal_.heading_rad = UnwrapAngle(walk.heading_rad, stance.heading_rad);
+  approach_ = goal_;
+  if (profile.stands_in_stride) {
+    const DVec3 rear = profile.stand_feet_m[static_cast<std::size_t>(profile.RearFoot())];
+    const double behind_m = FootOffset(profile.RearFoot(), profile.stand_m).z - rear.z;
+    approach_.position_m -= RotateYaw(goal_.heading_rad, DVec3(0.0, 0.0, behind_m));
+  }
 }
 
+// Returns the position of a foot relative to the body, with the feet side by side.
 DVec3 WalkSteering::FootOffset(Foot foot, double width_m) const {
   const DVec3 left = profile_.stand_feet_m[0];
   const DVec3 right = profile_.stand_feet_m[1];
-  return {0.5 * (left.x + right.x) + 0.5 * Outward(foot) * width_m, 0.0,
-          foot == Foot::kLeft ? left.z : right.z};
+  const double ahead_m = profile_.stands_in_stride ? 0.5 * (left.z + right.z)
+                         : foot == Foot::kLeft     ? left.z
+                                                   : right.z;
+  return {0.5 * (left.x + right.x) + 0.5 * Outward(foot) * width_m, 0.0, ahead_m};
 }
 
 WalkSteering::Body WalkSteering::BodyOver(Foot fixed) const {
@@ -98,19 +123,31 @@ WalkSteering::Body WalkSteering::BodyNow() const {
 }
 
 Footprint WalkSteering::GoalPrint(Foot foot) const {
-  return {goal_.position_m + RotateYaw(goal_.heading_rad, FootOffset(foot, profile_.stand_m)),
-          goal_.heading_rad};
+  DVec3 offset = FootOffset(foot, profile_.stand_m);
+  offset.z = profile_.stand_feet_m[static_cast<std::size_t>(foot)].z;
+  return {goal_.position_m + RotateYaw(goal_.heading_rad, offset), goal_.heading_rad};
 }
 
-bool WalkSteering::IsAtGoal(Foot foot, double within_m, double within_rad) const {
+bool WalkSteering::IsWithin(Foot foot, double within_m, double within_rad) const {
   const Footprint goal = GoalPrint(foot);
   return Length(At(foot).position_m - goal.position_m) <= within_m &&
          std::fabs(WrapAngle(At(foot).heading_rad - goal.heading_rad)) <= within_rad;
 }
 
+bool WalkSteering::IsAtGoal(Foot foot) const {
+  return stance_.is_aimed[static_cast<std::size_t>(foot)] ? IsWithin(foot, kAimedM, kAimedRad)
+                                                          : IsWithin(foot, kAtGoalM, kAtGoalRad);
+}
+
 bool WalkSteering::HasArrived(double within_m, double within_rad) const {
-  return IsAtGoal(Foot::kLeft, within_m, within_rad) &&
-         IsAtGoal(Foot::kRight, within_m, within_rad);
+  return std::fabs(WrapAngle(stance_.heading_rad - goal_.heading_rad)) <= within_rad &&
+         IsWithin(Foot::kLeft, within_m, within_rad) &&
+         IsWithin(Foot::kRight, within_m, within_rad);
+}
+
+bool WalkSteering::IsCloseToGoal() const {
+  return std::fabs(WrapAngle(stance_.heading_rad - goal_.heading_rad)) <= kAimedBodyRad &&
+         IsAtGoal(Foot::kLeft) && IsAtGoal(Foot::kRight);
 }
 
 void WalkSteering::PassWaypoints(std::size_t& next) const {
@@ -121,67 +158,137 @@ void WalkSteering::PassWaypoints(std::size_t& next) const {
   }
 }
 
-double WalkSteering::RemainingM(std::size_t next_waypoint) const {
-  double remaining_m = 0.0;
-  DVec3 from = BodyNow().position_m;
+// Returns the length of the way through the remaining waypoints.
+double WalkSteering::DistanceM(DVec3 from, std::size_t next_waypoint, const DVec3& to) const {
+  double distance_m = 0.0;
   for (std::size_t i = next_waypoint; i < walk_.waypoints_m.size(); ++i) {
-    remaining_m += Length(walk_.waypoints_m[i] - from);
+    distance_m += Length(walk_.waypoints_m[i] - from);
     from = walk_.waypoints_m[i];
   }
-  return remaining_m + Length(goal_.position_m - from);
+  return distance_m + Length(to - from);
 }
 
-double WalkSteering::RemainingRad() const {
-  return std::fabs(WrapAngle(goal_.heading_rad - stance_.heading_rad));
+double WalkSteering::EffortM(Foot moved, std::size_t next_waypoint) const {
+  const Body body = BodyOver(moved);
+  // Where the body is over this foot at the goal.
+  const DVec3 goal_m = GoalPrint(moved).position_m -
+                       RotateYaw(goal_.heading_rad, FootOffset(moved, profile_.stand_m));
+  const double distance_m = DistanceM(body.position_m, next_waypoint, goal_m);
+  DVec3 from = body.position_m;
+  double heading_rad = body.heading_rad;
+  double turn_rad = 0.0;
+  const auto turn_along = [&](const DVec3& to) {
+    const DVec3 way = to - from;
+    const double length_m = Length(way);
+    if (length_m < kAtGoalM) return;
+    const double along_rad = HeadingTo(way);
+    const double away_rad = WrapAngle(along_rad - heading_rad);
+    const double part = std::min(1.0, length_m / kNearM);
+    turn_rad += part * std::fabs(away_rad);
+    heading_rad += part * away_rad;
+    from = to;
+  };
+  for (std::size_t i = next_waypoint; i < walk_.waypoints_m.size(); ++i) {
+    turn_along(walk_.waypoints_m[i]);
+  }
+  turn_along(goal_m);
+  turn_rad += std::fabs(WrapAngle(goal_.heading_rad - heading_rad));
+  const double walking_m = distance_m + kTurnEffort * turn_rad;
+  if (next_waypoint < walk_.waypoints_m.size() || distance_m > kNearM) return walking_m;
+  const double shifting_m =
+      kSideEffort * distance_m +
+      kTurnEffort * std::fabs(WrapAngle(goal_.heading_rad - body.heading_rad));
+  return std::min(walking_m, shifting_m);
+}
+
+double WalkSteering::BodiesApartM() const {
+  return Length(BodyOver(Foot::kLeft).position_m - BodyOver(Foot::kRight).position_m);
+}
+
+bool WalkSteering::IsGoalNear(Foot moving, std::size_t next_waypoint) const {
+  return next_waypoint >= walk_.waypoints_m.size() &&
+         Length(GoalPrint(moving).position_m - At(OtherFoot(moving)).position_m) <=
+             profile_.longest_m + profile_.stand_m;
 }
 
 double WalkSteering::StepM() const {
   if (!walk_.speed_m_s) return profile_.step_m;
   const double step_s = stance_.last_step_s > 0.0 ? stance_.last_step_s : kFirstStepS;
-  return std::clamp(*walk_.speed_m_s * step_s, kShortestStepM, profile_.longest_m);
+  const double shortest_m = std::max(kShortestStepM, profile_.shortest_m);
+  return std::clamp(*walk_.speed_m_s * step_s, std::min(shortest_m, profile_.longest_m),
+                    profile_.longest_m);
 }
 
 double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const {
   if (next_waypoint < walk_.waypoints_m.size()) {
     return HeadingTo(walk_.waypoints_m[next_waypoint] - body.position_m);
   }
-  const DVec3 way = goal_.position_m - body.position_m;
+  const DVec3 way = approach_.position_m - body.position_m;
   const double straight_rad = HeadingTo(way);
   const double remaining_m = Length(way);
   if (remaining_m <= (1.0 + kStretch) * StepM()) return straight_rad;
-  const double bend_rad = std::fabs(WrapAngle(goal_.heading_rad - straight_rad));
+  const double bend_rad = std::fabs(WrapAngle(approach_.heading_rad - straight_rad));
   const double curve_m = std::min(kCurvePart * remaining_m, kCurveM) *
                          std::clamp((kMaxCurveRad - bend_rad) / kCurveFadeRad, 0.0, 1.0);
-  return HeadingTo(way - RotateYaw(goal_.heading_rad, DVec3(0.0, 0.0, curve_m)));
+  return HeadingTo(way - RotateYaw(approach_.heading_rad, DVec3(0.0, 0.0, curve_m)));
 }
 
 // Returns true if stepping sideways or backward, or turning on the spot, takes no more steps than
 // walking.
 bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   if (!is_last_leg) return false;
-  const DVec3 way = goal_.position_m - body.position_m;
+  const DVec3 way = approach_.position_m - body.position_m;
   const double remaining_m = Length(way);
   if (remaining_m > kMaxShiftM) return false;
-  if (remaining_m < kAtGoalM) return true;
+  if (remaining_m < kShuffleM) return true;
   const auto turning_steps = [](double turn_rad, double free_rad) {
     return 2.0 * std::max(0.0, std::fabs(turn_rad) - free_rad) /
            (kSpotTurn.out_rad + kSpotTurn.in_rad);
   };
   const double way_rad = HeadingTo(way);
-  const double walking = turning_steps(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
-                         remaining_m / StepM() + 1.0 +
-                         turning_steps(WrapAngle(goal_.heading_rad - way_rad), kSpotTurn.out_rad);
+  const double walking =
+      turning_steps(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
+      remaining_m / StepM() + 1.0 +
+      turning_steps(WrapAngle(approach_.heading_rad - way_rad), kSpotTurn.out_rad);
   const DVec3 local = RotateYaw(-body.heading_rad, way);
   const double ahead_m = local.z >= 0.0 ? StepM() : std::max(profile_.back_m, kLeastBackM);
   const double shifting =
       1.0 + std::max({std::fabs(local.z) / ahead_m, 2.0 * std::fabs(local.x) / kSideStepM,
-                      turning_steps(WrapAngle(goal_.heading_rad - body.heading_rad), 0.0)});
-  return shifting <= walking;
+                      turning_steps(WrapAngle(approach_.heading_rad - body.heading_rad), 0.0)});
+  // Side steps are short, so a library that only has strides avoids them.
+  return shifting <= walking - (profile_.shortest_m > kShortestStepM ? kStrideMargin : 0.0);
+}
+
+// If the avatar does not walk and its feet are apart along the way, prefers the foot behind and
+// returns true.
+bool WalkSteering::PreferFootBehind(const Body& body, std::size_t next_waypoint) {
+  if (stance_.last_step_s > 0.0) return false;
+  const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
+  const double left_ahead_m =
+      RotateYaw(-body.heading_rad, At(Foot::kLeft).position_m - At(Foot::kRight).position_m).z;
+  if (std::fabs(left_ahead_m) <= kFeetApartForwardM) return false;
+  // An avatar turns before it walks, so only side steps lead backward.
+  const bool is_backward =
+      PrefersSideSteps(body, is_last_leg) &&
+      RotateYaw(-body.heading_rad, approach_.position_m - body.position_m).z < -kFeetApartForwardM;
+  const Foot behind = (left_ahead_m > 0.0) != is_backward ? Foot::kRight : Foot::kLeft;
+  feet_ = {behind, OtherFoot(behind)};
+  return true;
 }
 
 std::span<const Foot> WalkSteering::FeetToMove(std::size_t next_waypoint) {
   const Foot expected = OtherFoot(stance_.last_moved);
   feet_ = {expected, stance_.last_moved};
+  const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    // The foot that is not at the goal yet moves next, unless it has just moved.
+    if (!is_last_leg || !IsAtGoal(foot)) continue;
+    if (stance_.last_step_s > 0.0 && OtherFoot(foot) != expected) continue;
+    feet_ = {OtherFoot(foot), foot};
+    return std::span(feet_).first(1);
+  }
+  const Body body = BodyNow();
+  if (PreferFootBehind(body, next_waypoint)) return std::span(feet_).first(1);
   const Body left = BodyOver(Foot::kLeft);
   const Body right = BodyOver(Foot::kRight);
   const bool is_together =
@@ -191,19 +298,13 @@ std::span<const Foot> WalkSteering::FeetToMove(std::size_t next_waypoint) {
   if (!is_together) return std::span(feet_).first(1);
 
   // From a stand, either foot may step first. Prefer the foot on the side of the turn or the path.
-  const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
   Foot first = expected;
-  const Body body = BodyNow();
   const auto towards = [&](double value, double least) {
     if (std::fabs(value) > least) first = value > 0.0 ? Foot::kLeft : Foot::kRight;
     return std::fabs(value) > least;
   };
-  if (is_last_leg && IsAtGoal(Foot::kLeft, kAtGoalM, kAtGoalRad)) {
-    first = Foot::kRight;
-  } else if (is_last_leg && IsAtGoal(Foot::kRight, kAtGoalM, kAtGoalRad)) {
-    first = Foot::kLeft;
-  } else if (PrefersSideSteps(body, is_last_leg)) {
-    const DVec3 local = RotateYaw(-body.heading_rad, goal_.position_m - body.position_m);
+  if (PrefersSideSteps(body, is_last_leg)) {
+    const DVec3 local = RotateYaw(-body.heading_rad, approach_.position_m - body.position_m);
     if (!towards(local.x, 0.06)) towards(WrapAngle(goal_.heading_rad - body.heading_rad), 0.1);
   } else {
     towards(WrapAngle(Bearing(body, next_waypoint) - body.heading_rad), 0.25);
@@ -216,16 +317,29 @@ WalkStep WalkSteering::NextStep(Foot moving, std::size_t next_waypoint, double p
                                 double bend_rad) const {
   const Body body = BodyOver(OtherFoot(moving));
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
-  if (is_last_leg && IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad)) {
+  if (is_last_leg && IsAtGoal(OtherFoot(moving))) {
     return part == 1.0 ? StepToGoal(moving) : StepTowardsGoal(moving, part);
   }
   if (PrefersSideSteps(body, is_last_leg)) return SideStep(body, moving, part, bend_rad);
   return Walk(body, moving, next_waypoint, part, bend_rad);
 }
 
+WalkStep WalkSteering::ComfortableStep(Foot moving, double turn_rad) const {
+  Body body = BodyOver(OtherFoot(moving));
+  body.heading_rad += turn_rad;
+  body.position_m += RotateYaw(body.heading_rad, DVec3(0.0, 0.0, profile_.step_m));
+  return StepTo(body, moving);
+}
+
+WalkStep WalkSteering::Pivot(Foot moving, double turn_rad) const {
+  Body body = BodyOver(OtherFoot(moving));
+  body.heading_rad += turn_rad;
+  return StepTo(body, moving);
+}
+
 WalkStep WalkSteering::StepToGoal(Foot moving) const {
   const DVec3 fixed_m = BodyOver(OtherFoot(moving)).position_m;
-  const bool is_at_goal = IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad);
+  const bool is_at_goal = IsAtGoal(OtherFoot(moving));
   return {GoalPrint(moving), is_at_goal ? goal_.position_m : 0.5 * (fixed_m + goal_.position_m),
           true};
 }
@@ -260,6 +374,18 @@ WalkStep WalkSteering::StepTo(const Body& body, Foot moving) const {
   return step;
 }
 
+// Returns the number of equal steps for a distance. If the library stands in a stride, the rear
+// foot must take the last of them, which decides whether the number is odd or even.
+double WalkSteering::StepCount(Foot moving, double distance_m, bool is_last_leg) const {
+  const double steps = PartCount(distance_m, StepM());
+  if (!profile_.stands_in_stride || !is_last_leg) return steps;
+  const bool ends_with_moving = std::fmod(steps, 2.0) == 1.0;
+  if (ends_with_moving == (moving == profile_.RearFoot())) return steps;
+  const bool may_be_longer =
+      steps > 1.0 && distance_m / (steps - 1.0) <= (1.0 + kStretch) * profile_.longest_m;
+  return may_be_longer ? steps - 1.0 : steps + 1.0;
+}
+
 WalkStep WalkSteering::Walk(const Body& body, Foot moving, std::size_t next_waypoint, double part,
                             double bend_rad) const {
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
@@ -268,13 +394,13 @@ WalkStep WalkSteering::Walk(const Body& body, Foot moving, std::size_t next_wayp
       part *
       TurnWithin(away_rad, moving, std::fabs(away_rad) > kSlowTurnRad ? kSpotTurn : kWalkTurn);
   const double rest_rad = std::fabs(away_rad - turn_rad);
-  const double remaining_m = RemainingM(next_waypoint);
-  const double steps = PartCount(remaining_m, StepM());
+  const double remaining_m = DistanceM(body.position_m, next_waypoint, approach_.position_m);
+  const double steps = StepCount(moving, remaining_m, is_last_leg);
   if (is_last_leg && steps <= 1.0 && part == 1.0 && bend_rad == 0.0 && rest_rad < 0.1) {
     const double last_rad = WrapAngle(goal_.heading_rad - body.heading_rad);
     const double turned_rad = TurnWithin(last_rad, moving, kWalkTurn);
     if (turned_rad == last_rad) return StepToGoal(moving);
-    return StepTo({goal_.position_m, body.heading_rad + turned_rad}, moving);
+    return StepTo({approach_.position_m, body.heading_rad + turned_rad}, moving);
   }
   const double step_m =
       part * remaining_m / steps * std::clamp(1.0 - rest_rad / kSlowTurnRad, 0.0, 1.0);
@@ -285,9 +411,9 @@ WalkStep WalkSteering::Walk(const Body& body, Foot moving, std::size_t next_wayp
 }
 
 WalkStep WalkSteering::SideStep(const Body& body, Foot moving, double part, double bend_rad) const {
-  DVec3 local = RotateYaw(-body.heading_rad, goal_.position_m - body.position_m);
+  DVec3 local = RotateYaw(-body.heading_rad, approach_.position_m - body.position_m);
   local = RotateYaw(bend_rad, local);
-  const double turn_rad = WrapAngle(goal_.heading_rad - body.heading_rad);
+  const double turn_rad = WrapAngle(approach_.heading_rad - body.heading_rad);
   const double outward = Outward(moving);
   const double aside_m = outward * local.x;
   const double turn_out_rad = outward * turn_rad;
@@ -304,7 +430,7 @@ WalkStep WalkSteering::SideStep(const Body& body, Foot moving, double part, doub
   const auto steps_of = [](double pairs, bool is_outer) {
     return pairs == 0.0 ? 1.0 : 2.0 * pairs - (is_outer ? 1.0 : 0.0);
   };
-  const double ahead_m = local.z >= 0.0 ? 0.8 * StepM() : std::max(profile_.back_m, kLeastBackM);
+  const double ahead_m = local.z >= 0.0 ? StepM() : std::max(profile_.back_m, kLeastBackM);
   const double steps =
       std::max({PartCount(std::fabs(local.z), ahead_m), steps_of(side_pairs, aside_m >= 0.0),
                 steps_of(turn_pairs, turn_out_rad >= 0.0)});

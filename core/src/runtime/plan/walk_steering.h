@@ -22,7 +22,8 @@ struct WalkStep {
 /// ground allow.
 ///
 /// The position of the body is derived from the foot that stays, as if the other foot stood beside
-/// it. Each step moves the body by an equal part of the remaining distance.
+/// it. Each step moves the body by an equal part of the remaining distance. If the library stands
+/// in a stride (LocomotionProfile::stands_in_stride), the feet end in the same stride at the goal.
 class WalkSteering {
  public:
   WalkSteering(const LocomotionProfile& profile, const WalkRequest& walk, const WalkStance& stance);
@@ -30,19 +31,37 @@ class WalkSteering {
   /// Advances `next` past all waypoints that have been reached.
   void PassWaypoints(std::size_t& next) const;
 
-  /// Returns true if both feet stand at the goal within the tolerances.
+  /// Returns true if the body and both feet are at the goal within the tolerances.
   [[nodiscard]] bool HasArrived(double within_m, double within_rad) const;
-  /// Return the remaining distance through the waypoints, and the remaining turn.
-  [[nodiscard]] double RemainingM(std::size_t next_waypoint) const;
-  [[nodiscard]] double RemainingRad() const;
+  /// Returns true if both feet are at the goal, or close to it after a step that was aimed at it
+  /// (WalkStance::is_aimed): within 0.02 m and 0.5 rad, with the body within 0.25 rad.
+  [[nodiscard]] bool IsCloseToGoal() const;
+  /// Returns the remaining effort in metres, as if the other foot stood beside `moved`: the
+  /// distance through the waypoints plus the turns, where a radian counts as 0.3 m. Close to the
+  /// goal, it is at most the effort of stepping sideways.
+  [[nodiscard]] double EffortM(Foot moved, std::size_t next_waypoint) const;
+  /// Returns the distance between the positions of the body over either foot. After a step it is
+  /// the length of the way that the body takes with this step.
+  [[nodiscard]] double BodiesApartM() const;
 
-  /// Returns the feet that may step next, the preferred foot first.
+  /// Returns the feet that may step next, the preferred foot first. During a walk the feet
+  /// alternate. Otherwise, if the feet are apart along the way, the foot behind is preferred.
   [[nodiscard]] std::span<const Foot> FeetToMove(std::size_t next_waypoint);
 
   /// Returns the next step of a foot, scaled by `part`, in a direction turned to the left by
   /// `bend_rad`.
   [[nodiscard]] WalkStep NextStep(Foot moving, std::size_t next_waypoint, double part,
                                   double bend_rad) const;
+
+  /// Returns a step forward of comfortable length that turns by `turn_rad`, wherever the goal is.
+  [[nodiscard]] WalkStep ComfortableStep(Foot moving, double turn_rad) const;
+
+  /// Returns a step in place that turns by `turn_rad`.
+  [[nodiscard]] WalkStep Pivot(Foot moving, double turn_rad) const;
+  /// Returns true if one long step of this foot can reach the goal.
+  [[nodiscard]] bool IsGoalNear(Foot moving, std::size_t next_waypoint) const;
+  /// Returns the step of this foot to its place at the goal.
+  [[nodiscard]] WalkStep StepToGoal(Foot moving) const;
 
   /// Returns the footprint of a foot at the goal.
   [[nodiscard]] Footprint GoalPrint(Foot foot) const;
@@ -59,8 +78,12 @@ class WalkSteering {
   [[nodiscard]] DVec3 FootOffset(Foot foot, double width_m) const;
   [[nodiscard]] Body BodyOver(Foot fixed) const;
   [[nodiscard]] Body BodyNow() const;
-  [[nodiscard]] bool IsAtGoal(Foot foot, double within_m, double within_rad) const;
+  [[nodiscard]] bool IsWithin(Foot foot, double within_m, double within_rad) const;
+  [[nodiscard]] bool IsAtGoal(Foot foot) const;
   [[nodiscard]] bool PrefersSideSteps(const Body& body, bool is_last_leg) const;
+  [[nodiscard]] double DistanceM(DVec3 from, std::size_t next_waypoint, const DVec3& to) const;
+  [[nodiscard]] double StepCount(Foot moving, double distance_m, bool is_last_leg) const;
+  [[nodiscard]] bool PreferFootBehind(const Body& body, std::size_t next_waypoint);
   [[nodiscard]] double StepM() const;
   [[nodiscard]] double Bearing(const Body& body, std::size_t next_waypoint) const;
   [[nodiscard]] WalkStep Walk(const Body& body, Foot moving, std::size_t next_waypoint, double part,
@@ -68,13 +91,15 @@ class WalkSteering {
   [[nodiscard]] WalkStep SideStep(const Body& body, Foot moving, double part,
                                   double bend_rad) const;
   [[nodiscard]] WalkStep StepTo(const Body& body, Foot moving) const;
-  [[nodiscard]] WalkStep StepToGoal(Foot moving) const;
   [[nodiscard]] WalkStep StepTowardsGoal(Foot moving, double part) const;
 
   const LocomotionProfile& profile_;
   const WalkRequest& walk_;
   const WalkStance& stance_;
   Body goal_;
+  // Where the body walks to before the last step. It differs from goal_ if the library stands in a
+  // stride: the rear foot is then at its place, and the last step moves the front foot ahead.
+  Body approach_;
   std::array<Foot, 2> feet_{};
 };
 

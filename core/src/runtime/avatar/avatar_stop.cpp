@@ -1,0 +1,80 @@
+// AvatarSimulation: steps that bring the feet together before a stand.
+
+#include <cmath>
+
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/locomotion_profile.h"
+
+namespace stridewire {
+namespace {
+
+// A second or third closing step must bring the feet closer by at least this much.
+constexpr double kClosingGainM = 0.03;
+// A step that ends this close to the stand needs no help from planting.
+constexpr double kClosedM = 0.03;
+
+// Returns the forward distance between the feet at the end of a planned step.
+double EndLength(const MotionLibrary& library, const RequestPlan& plan) {
+  const int end_z = library.group(plan.group).FindParameter(ParameterName::kEndZ);
+  return end_z < 0 ? 0.0 : plan.applied.values[static_cast<std::size_t>(end_z)];
+}
+
+}  // namespace
+
+// Plans a step that brings the feet together, or the first of two such steps. Returns nullopt if
+// the library has none, because any other step would only end in another stride.
+std::optional<RequestPlan> AvatarSimulation::PlanClosingStep() const {
+  const MotionLibrary& library = *body_.library;
+  const bool is_planted = body_.plants_feet;
+  const double largest_miss_m = is_planted ? kMaxPlantedErrorM : kFeetApartForwardM;
+  const auto closing = [&](const FootState& feet, Foot last_moved) {
+    const double length_m = stand_feet_.Vector(OtherFoot(last_moved)).z;
+    return PlanStep(library, StepRequest{.length_m = length_m}, feet, last_moved, false);
+  };
+  const auto foot_of = [&](const RequestPlan& plan) {
+    return MovingFoot(library.group(plan.group).kind);
+  };
+  const auto miss_of = [&](const RequestPlan& plan) {
+    return std::fabs(EndLength(library, plan) - stand_feet_.Vector(foot_of(plan)).z);
+  };
+
+  const auto plan = closing(feet_, last_moved_);
+  if (!plan) return std::nullopt;
+  const Foot foot = foot_of(*plan);
+  const double miss_m = miss_of(*plan);
+  if (miss_m <= (is_planted ? kClosedM : kFeetApartForwardM)) {
+    const double apart_m = std::fabs(feet_.Vector(foot).z - stand_feet_.Vector(foot).z);
+    const bool is_better = inserted_steps_ == 0 || miss_m < apart_m - kClosingGainM;
+    return is_better ? plan : std::nullopt;
+  }
+  if (miss_m <= largest_miss_m) return PlanPlantedClosingStep(foot);
+  if (inserted_steps_ + 1 >= kMaxInsertedSteps) return std::nullopt;
+  const DVec3 after(stand_feet_.Vector(foot).x, 0.0, EndLength(library, *plan));
+  const auto second = closing({foot == Foot::kLeft ? after : -after}, foot);
+  return second && miss_of(*second) <= largest_miss_m ? plan : std::nullopt;
+}
+
+// Plans a step onto the place of a foot beside the other foot. Planting brings the foot there,
+// although the library's own step ends elsewhere.
+std::optional<RequestPlan> AvatarSimulation::PlanPlantedClosingStep(Foot foot) const {
+  const DVec3 vector = stand_feet_.Vector(foot);
+  const DVec3 fixed_m = StandingPosition(OtherFoot(foot));
+  const DVec3 beside_m = fixed_m + RotateYaw(base_.heading_rad, DVec3(vector.x, 0.0, vector.z));
+  auto plan = PlanRequest(
+      {.movement = StepRequest{.foot = foot, .at = FootprintRequest{beside_m, base_.heading_rad}}});
+  if (!plan) return plan;
+  plan->most_residual_m = kMaxPlantedErrorM;
+  const auto fixed = static_cast<std::size_t>(OtherFoot(foot));
+  plan->root_m = fixed_m - RotateYaw(base_.heading_rad,
+                                     body_.library->locomotion_profile().stand_feet_m[fixed]);
+  return plan;
+}
+
+// Returns the reason why the feet are apart while the avatar stands, or an empty string.
+const char* AvatarSimulation::WhyFeetAreApart() const {
+  return AreFeetApart(feet_, stand_feet_)
+             ? "the library has no step that brings the feet together from here"
+             : "";
+}
+
+}  // namespace stridewire
