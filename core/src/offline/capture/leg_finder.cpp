@@ -279,8 +279,9 @@ bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
   return false;
 }
 
-// Returns true if the hands stand on the ground like the feet while the trunk is horizontal, in the
-// rest pose if its legs stand, else in most poses of the motion.
+// Returns true if the hands stand on the ground like the feet while the trunk is horizontal: in the
+// rest pose if it stands, else in most poses of the motion. The rest pose of rigs whose bones are
+// all parallel does not stand, since its trunk points down like its legs.
 bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
   int hands[2] = {-1, -1};
   for (int j = 0; j < static_cast<int>(figure.joints.size()); ++j) {
@@ -299,6 +300,18 @@ bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
     for (const FoundLeg& leg : legs.legs) sum += pose[Index(leg.hip)] - pose[Index(leg.ankle)];
     return sum;
   };
+  // The shoulder is where the arm leaves the trunk, at most as high as the neck.
+  const auto trunk_of = [&](const Pose& pose) {
+    DVec3 trunk(0.0);
+    for (const int hand : hands) {
+      int top = hand;
+      for (int j = figure.joints[Index(hand)].parent; j >= 0; j = figure.joints[Index(j)].parent) {
+        if (IsNameOutsideLegs(figure.joints[Index(j)].name)) top = j;
+      }
+      trunk += 0.5 * (pose[Index(top)] - pose[Index(legs.root)]);
+    }
+    return trunk;
+  };
   const auto on_hands = [&](const Pose& pose, const DVec3& up) {
     double lowest_foot = INFINITY;
     double highest_hand = -INFINITY;
@@ -309,24 +322,18 @@ bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
       lowest_hip = std::min(lowest_hip, glm::dot(pose[Index(leg.hip)], up));
       highest_hand = std::max(highest_hand, glm::dot(pose[Index(hands[side])], up));
     }
-    // The shoulder is where the arm leaves the trunk, at most as high as the neck.
-    DVec3 trunk(0.0);
-    for (const int hand : hands) {
-      int top = hand;
-      for (int j = figure.joints[Index(hand)].parent; j >= 0; j = figure.joints[Index(j)].parent) {
-        if (IsNameOutsideLegs(figure.joints[Index(j)].name)) top = j;
-      }
-      trunk += 0.5 * (pose[Index(top)] - pose[Index(legs.root)]);
-    }
+    const DVec3 trunk = trunk_of(pose);
     return highest_hand <= lowest_foot + 0.5 * kFloorShare * length &&
            std::fabs(glm::dot(trunk, up)) < kHorizontalShare * glm::length(trunk) &&
            lowest_hip > lowest_foot;
   };
   const DVec3 rest_up = legs_up(figure.rest);
   const DVec3 rest_axis = AxisVector(NearestAxis(rest_up));
-  if (figure.poses.empty() || glm::dot(rest_up, rest_axis) >= kStandsShare * length) {
-    return on_hands(figure.rest, rest_axis);
-  }
+  const DVec3 rest_trunk = trunk_of(figure.rest);
+  const bool rest_stands =
+      glm::dot(rest_up, rest_axis) >= kStandsShare * length &&
+      glm::dot(rest_trunk, rest_axis) > -kHorizontalShare * glm::length(rest_trunk);
+  if (rest_stands || figure.poses.empty()) return rest_stands && on_hands(figure.rest, rest_axis);
   DVec3 sum(0.0);
   for (const Pose& pose : figure.poses) sum += legs_up(pose);
   const DVec3 up = AxisVector(NearestAxis(sum));

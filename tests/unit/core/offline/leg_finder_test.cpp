@@ -382,5 +382,25 @@ TEST(LegFinder, RefusesAFigureOnHandsAndFeet) {
   }
 }
 
+// In rigs whose joints have their x axis along the bone, the rest pose is a bundle of parallel
+// bones. Its hands are beside the feet, but it says nothing about how the figure stands.
+TEST(LegFinder, AcceptsRigsWhoseBonesAreParallel) {
+  FigureSketch figure;
+  figure.Add("Hips", -1, Vec3(0.0f));
+  const int spine = figure.Add("Spine", 0, Vec3(0.4f, 0, 0));
+  for (const std::string side : {"Left", "Right"}) {
+    const float z = side == "Left" ? 0.1f : -0.1f;
+    int leg = figure.Add(side + "UpLeg", 0, Vec3(0, 0, z));
+    leg = figure.Add(side + "Leg", leg, Vec3(0.4f, 0, 0));
+    figure.Add(side + "Foot", leg, Vec3(0.4f, 0, 0));
+    int arm = figure.Add(side + "Arm", spine, Vec3(0, 0, 2.0f * z));
+    arm = figure.Add(side + "ForeArm", arm, Vec3(0.3f, 0, 0));
+    figure.Add(side + "Hand", arm, Vec3(0.3f, 0, 0));
+  }
+  const Expected<FoundLegs> legs = FindLegs(figure.Shape());
+  ASSERT_TRUE(legs.has_value()) << Describe(legs.error());
+  EXPECT_FALSE(legs->by_shape);
+}
+
 }  // namespace
 }  // namespace stridewire
