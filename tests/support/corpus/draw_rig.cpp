@@ -55,7 +55,7 @@ void DrawExtraJoints(bool is_anonymous, Random& random, Rig& rig, std::string& t
   }
 }
 
-void DrawRoots(Random& random, Rig& rig, std::string& text) {
+void DrawRoots(bool rest_must_stand, Random& random, Rig& rig, std::string& text) {
   if (!Chance(random, 0.35)) return;
   static constexpr std::pair<Roots, const char*> kRoots[] = {
       {Roots::kStatic, "; static root"},
@@ -63,12 +63,13 @@ void DrawRoots(Random& random, Rig& rig, std::string& text) {
       {Roots::kTrajectory, "; trajectory root"},
       {Roots::kSplit, "; motion split over three roots"}};
   const auto& [roots, name] = kRoots[Below(random, std::size(kRoots))];
+  if (rest_must_stand && roots == Roots::kRotated) return;
   AddRoots(roots, rig);
   text += name;
 }
 
-void DrawFrames(bool is_anonymous, Random& random, Rig& rig, std::string& text) {
-  if (is_anonymous || !Chance(random, 0.35)) return;
+void DrawFrames(Random& random, Rig& rig, std::string& text) {
+  if (!Chance(random, 0.35)) return;
   static constexpr std::pair<Frames, const char*> kFrames[] = {
       {Frames::kLegsDown, "; leg frames turned by 180 degrees"},
       {Frames::kLegsAside, "; leg frames turned by 90 degrees"},
@@ -100,12 +101,15 @@ std::string DrawRig(Movement movement, Random& random, Rig& rig) {
     Translate(DVec3(random.Draw(-40, 40), random.Draw(-0.2, 0.2), random.Draw(-40, 40)), rig);
     text += "; far from the origin";
   }
-  DrawRoots(random, rig, text);
+  // If the figure never stands, only a rest pose that stands tells which way is up.
+  const bool rest_must_stand = movement == Movement::kSit || movement == Movement::kLie ||
+                               movement == Movement::kCrawl || movement == Movement::kHang;
+  DrawRoots(rest_must_stand, random, rig, text);
   if (movement == Movement::kWalk && Chance(random, 0.12)) {
     InsertRestFrames(1, rig);
     text += "; rest pose in frame 0";
   }
-  DrawFrames(style.is_anonymous(), random, rig, text);
+  if (!rest_must_stand && !style.is_anonymous()) DrawFrames(random, rig, text);
   const Orientation orientation = DrawOrientation(random);
   TurnWorld(orientation.turn, rig);
   const Unit& unit = kUnits[Below(random, std::size(kUnits))];

@@ -111,7 +111,7 @@ FigureMotion Crawl(const Figure& figure, double fps, double seconds) {
   return Sample(fps, seconds, [&](double t) {
     FigurePose pose;
     pose.pelvis_m = DVec3(0.0, 0.05 + half_leg, kStepM * t / kStepS);
-    pose.pelvis = AboutX(80.0 * kDegree);
+    pose.pelvis = AboutX(72.0 * kDegree);  // The hands reach the floor.
     for (int foot = 0; foot < 2; ++foot) {
       // Each knee rests for one step and moves two step lengths ahead in the next.
       const double cycle = t / kStepS + foot;
