@@ -15,6 +15,7 @@
 
 #include "motion_library_generated.h"
 #include "runtime/library/keytimes.h"
+#include "runtime/library/knee_hinges.h"
 #include "runtime/library/library_file.h"
 #include "runtime/library/locomotion_profile.h"
 #include "runtime/library/transition.h"
@@ -553,7 +554,6 @@ Status MotionLibrary::Load() {
         std::fabs(stand.z) <= kMaxRootM)) {
     return Fail(ErrorCode::kMalformed, "the stand pose's root is out of range");
   }
-  leg_rig_ = std::make_unique<const LegRig>(MakeLegRig(skeleton_, stand_pose_));
 
   if (root.groups()->size() < 1 || root.groups()->size() > static_cast<std::size_t>(kMaxGroups)) {
     return Fail(ErrorCode::kMalformed, "the group count is out of range", root.groups()->size());
@@ -564,6 +564,8 @@ Status MotionLibrary::Load() {
     max_example_count_ = std::max(max_example_count_, group->example_count);
     groups_.push_back(std::move(*group));
   }
+  leg_rig_ =
+      std::make_unique<const LegRig>(MakeLegRig(skeleton_, stand_pose_, LearnKneeHinges(*this)));
   locomotion_profile_ = std::make_unique<const LocomotionProfile>(MakeLocomotionProfile(*this));
   if (const auto* from = root.transitions()) {
     std::vector<Transition> transitions;

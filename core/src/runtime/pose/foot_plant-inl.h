@@ -221,13 +221,12 @@ HWY_INLINE SoaQuat ShortestArc(SoaVec3 from, SoaVec3 to) {
   return Normalise({axis.x, axis.y, axis.z, scale + Dot(from, to)});
 }
 
-HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaQuat hip_rotation) {
+HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaVec3 reference) {
   const Float scale = Sqrt(Dot(thigh, thigh) * Dot(shank, shank));
   const SoaVec3 plane = Cross(thigh, shank) * (Float(1.0f) / scale);
   const Float sine = Sqrt(Dot(plane, plane));
   const Float s =
       Clamp(DivideBy(Float(kBentSine) - sine, kBentSine - kStraightSine), Float(0.0f), Float(1.0f));
-  const SoaVec3 reference = Rotate(hip_rotation, {Float(1.0f), Float(0.0f), Float(0.0f)});
   const Mask is_backward = Dot(plane, reference) < Float(0.0f);
   const Float forward = Select(is_backward, Float(0.0f), Float(1.0f));
   const Float weight = Select(is_backward, Float(1.0f), s * s * (Float(3.0f) - Float(2.0f) * s));
@@ -272,7 +271,8 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarg
     const Float d = Clamp(w.distance, Float(shortest), Float(kMaxLegExtension * (l1 + l2)));
     const Float a = (Float(l1 * l1 - l2 * l2) + d * d) / (d + d);
     const Float h = Sqrt(Max(Float(0.0f), Float(l1 * l1) - a * a));
-    SoaVec3 pole = Cross(w.towards, KneeAxis(w.thigh, w.shank, legs[f].rotations[bones.hip]));
+    const SoaVec3 hinge = Rotate(legs[f].rotations[bones.hip], Broadcast(bones.hinge));
+    SoaVec3 pole = Cross(w.towards, KneeAxis(w.thigh, w.shank, hinge));
     const Float pole_length = Sqrt(Dot(pole, pole));
     const Mask has_pole = pole_length > Float(1e-6f);
     pole = Select(has_pole, pole * (Float(1.0f) / Max(pole_length, Float(1e-6f))),

@@ -42,7 +42,7 @@ inline constexpr double kSoleDown = 0.8;
 // A leg with a shorter thigh or shank cannot be planted.
 inline constexpr float kSmallestBoneM = 1e-3f;
 // The axis of a knee is the normal of the leg's plane once the sine of the knee's bend exceeds
-// kBentSine. A straighter knee has no reliable plane, so the left-right axis of the hip joint is
+// kBentSine. A straighter knee has no reliable plane, so the knee's hinge (LegRig::Side::hinge) is
 // mixed in with weight kReferenceWeight; below kStraightSine it has its full weight.
 inline constexpr float kStraightSine = 0.04f;
 inline constexpr float kBentSine = 0.14f;

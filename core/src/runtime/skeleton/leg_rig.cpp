@@ -23,12 +23,12 @@ Quat ShortestArc(const Vec3& from, const Vec3& to) {
 }
 
 // Returns the axis of the knee. A positive rotation about it moves the shank backward.
-Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Quat& hip_rotation) {
+// `reference` is the hinge of the knee in world axes.
+Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Vec3& reference) {
   const float scale = std::sqrt(glm::dot(thigh, thigh) * glm::dot(shank, shank));
   const Vec3 plane = glm::cross(thigh, shank) / scale;
   const float sine = std::sqrt(glm::dot(plane, plane));
   const float s = std::clamp((kBentSine - sine) / (kBentSine - kStraightSine), 0.0f, 1.0f);
-  const Vec3 reference = hip_rotation * Vec3(1.0f, 0.0f, 0.0f);
   // Treat a knee that is bent backward as straight.
   const float forward = glm::dot(plane, reference) < 0.0f ? 0.0f : 1.0f;
   const float weight = forward > 0.0f ? s * s * (3.0f - 2.0f * s) : 1.0f;
@@ -61,6 +61,7 @@ LegRig::Bones BonesOf(const Skeleton& skeleton, Foot foot, const LegRig::Side& s
   Copy(skeleton.leg(foot).ball_offset_m, bones.ball_m);
   Copy(skeleton.leg(foot).toe_tip_offset_m, bones.toe_tip_m);
   Copy(side.heel_m, bones.heel_m);
+  Copy(side.hinge, bones.hinge);
   bones.thigh_m = side.thigh_m;
   bones.shank_m = side.shank_m;
   bones.ball_height_m = static_cast<float>(side.ball_height_m);
@@ -72,12 +73,14 @@ LegRig::Bones BonesOf(const Skeleton& skeleton, Foot foot, const LegRig::Side& s
 
 }  // namespace
 
-LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose) {
+LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
+                  const std::array<Vec3, 2>& knee_hinges) {
   LegRig rig;
   rig.is_usable = true;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     LegRig::Side& side = rig.sides[static_cast<std::size_t>(foot)];
     const Leg& leg = skeleton.leg(foot);
+    side.hinge = knee_hinges[static_cast<std::size_t>(foot)];
     for (int j = leg.ball; j >= 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
       side.chain.push_back(j);
     }
@@ -177,7 +180,7 @@ void SolveLeg(const LegRig& rig, Foot foot, const LegPose& leg, const Vec3& ankl
   // in the plane of the knee.
   const float a = (l1 * l1 - l2 * l2 + d * d) / (2.0f * d);
   const float h = std::sqrt(std::max(0.0f, l1 * l1 - a * a));
-  Vec3 pole = glm::cross(u, KneeAxis(thigh, shank, leg.world_rotations[hip]));
+  Vec3 pole = glm::cross(u, KneeAxis(thigh, shank, leg.world_rotations[hip] * side.hinge));
   const float pole_length = std::sqrt(glm::dot(pole, pole));
   // A leg that points along its own knee axis has no plane, so any direction is as good.
   pole = pole_length > 1e-6f ? pole / pole_length : Vec3(0.0f, 0.0f, 1.0f);

@@ -19,6 +19,9 @@ struct LegRig {
     int ankle = 0;
     float thigh_m = 0.0f;  ///< Distance from hip to knee. Joints in between do not bend.
     float shank_m = 0.0f;  ///< Distance from knee to ankle.
+    /// Hinge axis of the knee in the frame of the hip joint, of unit length. A positive rotation
+    /// about it moves the shank backward.
+    Vec3 hinge = Vec3(0.0f);
     /// Height of the ball's centre above the ground in the stand pose.
     double ball_height_m = 0.0;
     /// Direction from ankle to ball in the stand pose, relative to its heading.
@@ -44,6 +47,7 @@ struct LegRig {
     float ball_m[3]{};     ///< Position of the ball in the frame of the last joint.
     float toe_tip_m[3]{};  ///< Position of the tip of the toes in the frame of the last joint.
     float heel_m[3]{};     ///< Position of the heel in the frame of the ankle.
+    float hinge[3]{};      ///< Hinge axis of the knee in the frame of the hip joint.
     float thigh_m = 0.0f;
     float shank_m = 0.0f;
     float ball_height_m = 0.0f;
@@ -69,7 +73,9 @@ inline constexpr double kSoleBehindAnkleM =
     /// joint.
     0.06;
 
-[[nodiscard]] LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose);
+/// `knee_hinges` [foot]: see LegRig::Side::hinge.
+[[nodiscard]] LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
+                                const std::array<Vec3, 2>& knee_hinges);
 
 /// A leg of a pose, from forward kinematics along its chain. Positions are relative to the root, in
 /// world axes, so that floats stay precise far from the origin.
