@@ -28,9 +28,10 @@ using Clusters = std::vector<std::vector<int>>;
 struct Steps {
   Steps(const RawLibrary& library, const RawGroup& raw)
       : skeleton(library.skeleton), group(raw), layout(skeleton.joint_count()) {
-    const std::vector<int> cells = ChooseCells(group, 30.0, layout);
+    const Quat& stand_root = library.stand_pose.rotations[0];
+    const std::vector<int> cells = ChooseCells(group, 30.0, layout, stand_root);
     for (const RawExample& example : group.examples) {
-      examples.push_back(ResampleOnGrid(example, cells, layout));
+      examples.push_back(ResampleOnGrid(example, cells, layout, stand_root));
     }
     AlignHemispheres(examples, layout, skeleton.joint_count());
     for (const GridExample& example : examples) {

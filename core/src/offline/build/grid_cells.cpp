@@ -37,8 +37,8 @@ IntervalLength LengthOf(const RawGroup& group, std::size_t interval) {
 
 // Returns the error of the stored example per interval: the mean over joints and time, in radians.
 std::vector<double> StoredErrors(const RawExample& example, const std::vector<int>& cells,
-                                 const GridLayout& layout) {
-  const GridExample stored = ResampleOnGrid(example, cells, layout);
+                                 const GridLayout& layout, const Quat& stand_root) {
+  const GridExample stored = ResampleOnGrid(example, cells, layout, stand_root);
   // Puts each example into a group of its own, so that the error is measured with the code that
   // plays it.
   MotionGroup alone;
@@ -72,7 +72,8 @@ std::vector<double> StoredErrors(const RawExample& example, const std::vector<in
 
 }  // namespace
 
-std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout& layout) {
+std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout& layout,
+                             const Quat& stand_root) {
   STRIDEWIRE_CHECK(!group.examples.empty());
   const std::size_t intervals = group.examples.front().keytimes_s.size() - 1;
   double clip_fps = 0.0;
@@ -93,7 +94,7 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
     // is above the mean.
     std::vector<bool> grows(intervals, false);
     for (const RawExample& example : group.examples) {
-      const std::vector<double> errors = StoredErrors(example, cells, layout);
+      const std::vector<double> errors = StoredErrors(example, cells, layout, stand_root);
       const std::vector<double>& keys = example.keytimes_s;
       double mean = 0.0;
       for (std::size_t i = 0; i < intervals; ++i) {

@@ -36,7 +36,7 @@ std::size_t MedoidIndex(const std::vector<GridExample>& examples) {
 }  // namespace
 
 GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
-                           const GridLayout& layout) {
+                           const GridLayout& layout, const Quat& stand_root) {
   STRIDEWIRE_CHECK(example.keytimes_s.size() == cells.size() + 1);
   STRIDEWIRE_CHECK(example.clip.joint_count == layout.joint_count);
   Clip clip = example.clip;
@@ -61,7 +61,7 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
     float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
     double wrapped_rad = yaw_rad;
     // If the root is nearly vertical, HeadingOf leaves the previous yaw unchanged.
-    HeadingOf(pose.rotations[0], wrapped_rad);
+    HeadingOf(pose.rotations[0] * glm::conjugate(stand_root), wrapped_rad);
     yaw_rad = UnwrapAngle(wrapped_rad, yaw_rad);
     pose.rotations[0] = YawRotation(-yaw_rad) * pose.rotations[0];
     for (std::size_t j = 0; j < pose.rotations.size(); ++j) {

@@ -18,9 +18,10 @@ struct GridExample {
   bool mirrored = false;
 };
 
-// Samples an example at the grid points, using its own keytimes.
+// Samples an example at the grid points, using its own keytimes. `stand_root` is the rotation of the
+// root in the stand pose, where its heading is 0: the axes of the root's own frame do not matter.
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
-                                         const GridLayout& layout);
+                                         const GridLayout& layout, const Quat& stand_root);
 
 // Makes the rotation tracks of each joint continuous in sign, and then flips whole tracks into the
 // hemisphere of a reference: the example nearest to the mean parameters. Flipping single points

@@ -230,6 +230,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     return Fail(ErrorCode::kShapeMismatch, "stand_pose and skeleton have different joints");
   }
   const GridLayout layout(joint_count);
+  const Quat& stand_root = raw.stand_pose.rotations[0];
 
   std::vector<std::unique_ptr<StoredGroup>> groups;  // Own the data that `views` refers to.
   std::vector<MotionGroup> views;
@@ -245,11 +246,11 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
       }
     }
 
-    const std::vector<int> cells = ChooseCells(group, grid_fps, layout);
+    const std::vector<int> cells = ChooseCells(group, grid_fps, layout, stand_root);
     std::vector<GridExample> found;
     found.reserve(group.examples.size());
     for (const RawExample& example : group.examples) {
-      found.push_back(ResampleOnGrid(example, cells, layout));
+      found.push_back(ResampleOnGrid(example, cells, layout, stand_root));
     }
     AlignHemispheres(found, layout, joint_count);
 

@@ -10,6 +10,18 @@ namespace stridewire {
 namespace {
 
 constexpr double kPelvisSmoothS = 0.06;
+// Hip joints that are closer to each other, seen from above, give no direction.
+constexpr double kHipsApartM = 0.01;
+
+// Returns the yaw of the pelvis, or `fallback_rad` if the line between the hip joints is vertical.
+// It follows from positions, because the axes of the root's own frame may have any direction.
+double PelvisYaw(const Skeleton& skeleton, ConstPoseSpan pose, double fallback_rad) {
+  const auto hip = [&](Foot foot) {
+    return DVec3(PointPosition(skeleton, pose, skeleton.leg(foot).hip, Vec3(0.0f)));
+  };
+  const DVec3 left = hip(Foot::kLeft) - hip(Foot::kRight);
+  return std::hypot(left.x, left.z) < kHipsApartM ? fallback_rad : std::atan2(-left.z, left.x);
+}
 
 // Returns the indices of the joints that belong to neither leg, without the root.
 std::vector<std::size_t> TrunkJoints(const Skeleton& skeleton) {
@@ -101,8 +113,7 @@ BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame
       }
       tracks.trunk_m.push_back(weight > 0.0 ? sum / weight : DVec3(pose.root_position_m));
     }
-    double frame_yaw_rad = yaw_rad;
-    HeadingOf(pose.rotations[0], frame_yaw_rad);
+    const double frame_yaw_rad = PelvisYaw(skeleton, pose, yaw_rad);
     yaw_rad = f == tracks.frames.begin ? frame_yaw_rad : UnwrapAngle(frame_yaw_rad, yaw_rad);
     tracks.pelvis_yaw_rad.push_back(yaw_rad);
   }

@@ -23,7 +23,9 @@ struct BodyTracks {
   FootTrajectory feet[2];  ///< Trajectories of the two feet, indexed by Foot.
   std::vector<DVec3> pelvis_m;
   std::vector<double> pelvis_speed_m_s;  ///< Speed along the path smoothed over 60 ms.
-  std::vector<double> pelvis_yaw_rad;    ///< Unwrapped yaw of the pelvis; positive is left.
+  /// Unwrapped yaw of the pelvis; positive is left. The direction from the right to the left hip
+  /// joint is 90 degrees to the left of it.
+  std::vector<double> pelvis_yaw_rad;
   /// Mean position of the joints that belong to neither leg, weighted by the lengths of their
   /// bones. Empty if there are none.
   std::vector<DVec3> trunk_m;
