@@ -163,7 +163,7 @@ class Comparer {
   Comparer(const MotionLibrary& library, const MotionGroup& group)
       : library_(library),
         group_(group),
-        comparison_(library.skeleton()),
+        comparison_(library.skeleton(), library.stand_pose()),
         cache_(library.layout()),
         pose_(library.skeleton().joint_count()) {}
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "offline/extract/mirror.h"
+#include "offline/extract/mirror_joints.h"
 #include "runtime/library/keytimes.h"
 #include "runtime/pose/evaluate_poses.h"
 
@@ -13,18 +13,19 @@ namespace {
 
 constexpr float kSideMinM = 0.03f;
 
-std::vector<bool> SidedJoints(const Skeleton& skeleton) {
+std::vector<bool> SidedJoints(const Skeleton& skeleton, ConstPoseSpan stand_pose) {
   const auto n = skeleton.joints.size();
   std::vector<bool> sided(n, false);
-  if (const auto partners = FindMirrorJoints(skeleton)) {
+  if (const auto partners = FindMirrorJoints(skeleton, stand_pose)) {
     for (std::size_t j = 0; j < n; ++j) sided[j] = (*partners)[j] != static_cast<int>(j);
     return sided;
   }
-  std::vector<float> x(n, 0.0f);
+  std::vector<Vec3> positions(n);
+  std::vector<Quat> rotations(n);
+  ForwardKinematics(skeleton, stand_pose, positions, rotations);
   for (std::size_t j = 1; j < n; ++j) {
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
-    x[j] = x[parent] + skeleton.joints[j].offset_m.x;
-    sided[j] = sided[parent] || std::fabs(x[j]) > kSideMinM;
+    sided[j] = sided[parent] || std::fabs(positions[j].x - positions[0].x) > kSideMinM;
   }
   return sided;
 }
@@ -36,7 +37,7 @@ std::string_view BodyPartName(BodyPart part) {
   return kNames[static_cast<std::size_t>(part)];
 }
 
-std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton) {
+std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton, ConstPoseSpan stand_pose) {
   const auto n = skeleton.joints.size();
   std::vector<BodyPart> parts(n, BodyPart::kTrunk);
   // Joints between root and hip that carry only a leg belong to the trunk.
@@ -46,7 +47,7 @@ std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton) {
       above_hip[static_cast<std::size_t>(j)] = true;
     }
   }
-  const std::vector<bool> sided = SidedJoints(skeleton);
+  const std::vector<bool> sided = SidedJoints(skeleton, stand_pose);
   std::vector<bool> carries_arm(n, false);
   for (std::size_t j = 1; j < n; ++j) {
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
@@ -73,8 +74,10 @@ std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton) {
   return parts;
 }
 
-PoseComparison::PoseComparison(const Skeleton& skeleton)
-    : skeleton_(skeleton), parts_(FindBodyParts(skeleton)), rotations_(skeleton.joints.size()) {
+PoseComparison::PoseComparison(const Skeleton& skeleton, ConstPoseSpan stand_pose)
+    : skeleton_(skeleton),
+      parts_(FindBodyParts(skeleton, stand_pose)),
+      rotations_(skeleton.joints.size()) {
   for (auto& positions : positions_) positions.resize(skeleton.joints.size());
 }
 

@@ -21,10 +21,11 @@ inline constexpr int kBodyPartCount = 4;
 [[nodiscard]] std::string_view BodyPartName(BodyPart part);
 
 /// Returns the part of the body of each joint. Legs: the hips and all joints below them. Arms:
-/// other joints on one side, by FindMirrorJoints or else more than 3 cm from the root sideways at
-/// identity rotations. Head: joints in the middle above the joint where the arms branch off. Trunk:
+/// other joints on one side, by FindMirrorJoints or else more than 3 cm from the root sideways in
+/// the stand pose. Head: joints in the middle above the joint where the arms branch off. Trunk:
 /// the rest.
-[[nodiscard]] std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton);
+[[nodiscard]] std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton,
+                                                  ConstPoseSpan stand_pose);
 
 /// Distances between the joints of two movements, in metres.
 struct PoseError {
@@ -39,7 +40,7 @@ struct PoseError {
 /// thread-safe.
 class PoseComparison {
  public:
-  explicit PoseComparison(const Skeleton& skeleton);
+  PoseComparison(const Skeleton& skeleton, ConstPoseSpan stand_pose);
 
   /// Returns the distances of corresponding joints at equal generic times. Error: kShapeMismatch if
   /// the numbers of poses or joints differ, or if there is no pose.

@@ -122,7 +122,8 @@ class Assembler {
   Assembler(const AssembleOptions& options, const Skeleton& skeleton,
             std::span<const Extraction> files)
       : options_(options), skeleton_(skeleton), files_(files) {
-    if (options.mirror) partners_ = FindMirrorJoints(skeleton);
+    if (options.mirror)
+      mirror_ = FindSkeletonMirror(skeleton, MeasurePosture(skeleton, Examples()));
     for (int f = 0; f < 2; ++f) {
       std::vector<double> heights;
       for (const Extraction& file : files) {
@@ -133,7 +134,7 @@ class Assembler {
   }
 
   Expected<RawLibrary> Run() {
-    if (options_.mirror && !partners_) {
+    if (options_.mirror && !mirror_) {
       return Fail(ErrorCode::kUnsupported,
                   "cannot mirror: neither names nor positions of the joints pair left with right",
                   "--mirror");
@@ -154,6 +155,17 @@ class Assembler {
   }
 
  private:
+  // Returns all steps and jumps of the usable captures.
+  [[nodiscard]] std::vector<const ExtractedExample*> Examples() const {
+    std::vector<const ExtractedExample*> examples;
+    for (const Extraction& file : files_) {
+      if (!file.error.empty()) continue;
+      for (const ExtractedExample& step : file.general_steps) examples.push_back(&step);
+      for (const ExtractedExample& jump : file.jump_examples) examples.push_back(&jump);
+    }
+    return examples;
+  }
+
   // Returns the vertical shift that brings the balls of the standing feet of a capture to the
   // height of the library. Markers may displace a foot (by up to 2 cm), so the foot with the
   // smaller difference decides.
@@ -179,8 +191,8 @@ class Assembler {
       for (const ExtractedExample& example : file.*member) {
         if (!keep(example)) continue;
         Append(example, file, pool);
-        if (partners_ && IsStep(kind)) {
-          Append(MirrorExample(skeleton_, *partners_, names, example), file, pool);
+        if (mirror_ && IsStep(kind)) {
+          Append(MirrorExample(skeleton_, *mirror_, names, example), file, pool);
         }
       }
     }
@@ -275,7 +287,7 @@ class Assembler {
   const AssembleOptions& options_;
   const Skeleton& skeleton_;
   std::span<const Extraction> files_;
-  std::optional<std::vector<int>> partners_;
+  std::optional<SkeletonMirror> mirror_;
   double ball_height_m_[2] = {0.0, 0.0};
 };
 

@@ -5,24 +5,54 @@
 #include <vector>
 
 #include "offline/extract/extract.h"
+#include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
 
 namespace stridewire {
 
-/// Returns the index of the mirrored joint for each joint; joints on the spine map to themselves.
-///
-/// Joints are paired by names: Left/Right anywhere in the name, or a leading L/R or l/r. If the
-/// names do not pair all joints, they are paired by shape. Then the legs are partners, and so are
-/// joints whose bones, including all bones below, are mirror images at identity rotations (within 8
-/// % and 1 cm). Returns nullopt if a joint off the plane of symmetry remains without partner.
-[[nodiscard]] std::optional<std::vector<int>> FindMirrorJoints(const Skeleton& skeleton);
+/// How a skeleton is mirrored at the plane x = 0.
+struct SkeletonMirror {
+  std::vector<int> partners;  ///< See FindMirrorJoints.
+  /// [joint]: rotation from the joint's own frame to the mirror image of its partner's frame. If M
+  /// is the reflection x -> -x, and W and W' are world rotations before and after mirroring:
+  ///
+  ///   W'_j = M W_p M turns[j],   p = partners[j]
+  ///
+  /// The turn takes the bones of the joint to the mirror images of its partner's bones, so that
+  /// mirrored bones point in mirrored directions, whatever the axes of the joints' frames are.
+  std::vector<DQuat> turns;
+};
 
-/// Returns the mirror image of a movement: x -> -x, rotations (x, -y, -z, w), sides swapped. A left
-/// step becomes a right step; sideways parameters and the turn change sign. `partners` is the
-/// result of FindMirrorJoints. The parameters of steps are measured again at the balls, since no
-/// figure is perfectly symmetric. `names` are the names of `source.example.parameters`.
-[[nodiscard]] ExtractedExample MirrorExample(const Skeleton& skeleton,
-                                             const std::vector<int>& partners,
+/// What mirroring needs to know about the posture of a figure.
+struct Posture {
+  /// Mean of each joint's rotation relative to its parent, and of the root's relative to the
+  /// heading. The root is at the origin. The identity if there are no examples.
+  Pose mean;
+  /// [joint]: true if the joint does not turn relative to its parent.
+  std::vector<bool> is_rigid;
+  /// [joint]: mean direction of up in the joint's own frame while its foot stands flat on the
+  /// ground, of unit length. Zero for joints that are not part of a foot, and if that foot never
+  /// stands while the other one swings.
+  std::vector<DVec3> sole_up;
+};
+
+[[nodiscard]] Posture MeasurePosture(const Skeleton& skeleton,
+                                     std::span<const ExtractedExample* const> examples);
+
+/// Returns the mirror of a skeleton, or nullopt if its joints cannot be paired (FindMirrorJoints).
+///
+/// A joint and the joints that are rigid relative to it form one body. If its bones have different
+/// directions, they determine its turn. A single bone leaves a rotation about the bone open. It is
+/// chosen such that the mean posture changes as little as possible. Bones of a foot are mirrored as seen from above: a flat
+/// sole stays flat, although the balls of both feet may be at different heights.
+[[nodiscard]] std::optional<SkeletonMirror> FindSkeletonMirror(const Skeleton& skeleton,
+                                                               const Posture& posture);
+
+/// Returns the mirror image of a movement. A left step becomes a right step; sideways parameters
+/// and the turn change sign. Bones keep their own lengths, so a figure that is not perfectly
+/// symmetric differs from the mirror image by these lengths, and the parameters of steps are
+/// measured again at the balls. `names` are the names of `source.example.parameters`.
+[[nodiscard]] ExtractedExample MirrorExample(const Skeleton& skeleton, const SkeletonMirror& mirror,
                                              std::span<const ParameterName> names,
                                              const ExtractedExample& source);
 

@@ -10,6 +10,8 @@
 #include "capture_files.h"
 #include "offline/builtin/builtin_library.h"
 #include "offline/extract/mirror.h"
+#include "offline/extract/mirror_joints.h"
+#include "reframing.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/keytimes.h"
 #include "runtime/skeleton/foot_vector.h"
@@ -344,15 +346,16 @@ TEST(FindMirrorJoints, PairsByShapeWithoutNames) {
     if (!captures.empty()) skeletons.push_back(ReadBvh(captures.front())->skeleton);
   }
   for (Skeleton& skeleton : skeletons) {
-    const std::optional<std::vector<int>> by_name = FindMirrorJoints(skeleton);
+    const Pose rest(skeleton.joint_count());
+    const std::optional<std::vector<int>> by_name = FindMirrorJoints(skeleton, rest);
     ASSERT_TRUE(by_name.has_value());
     for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
       skeleton.joints[j].name = "joint " + std::to_string(j);
     }
-    EXPECT_EQ(FindMirrorJoints(skeleton), by_name) << skeleton.joints.size() << " joints";
+    EXPECT_EQ(FindMirrorJoints(skeleton, rest), by_name) << skeleton.joints.size() << " joints";
     // This makes the skeleton asymmetric.
     skeleton.joints[static_cast<std::size_t>(skeleton.leg(Foot::kLeft).knee)].offset_m.y *= 1.3f;
-    EXPECT_EQ(FindMirrorJoints(skeleton), std::nullopt);
+    EXPECT_EQ(FindMirrorJoints(skeleton, rest), std::nullopt);
   }
 }
 
@@ -419,20 +422,58 @@ TEST(LibraryAssembler, MirroredSubject16StartsAndStopsOnBothFeet) {
   }
 }
 
+std::optional<SkeletonMirror> MirrorOf(const Extraction& found) {
+  std::vector<const ExtractedExample*> steps;
+  for (const ExtractedExample& step : found.general_steps) steps.push_back(&step);
+  return FindSkeletonMirror(found.skeleton, MeasurePosture(found.skeleton, steps));
+}
+
+// Bones of equal length on both sides must end at the exact mirror images.
+TEST(MirrorExample, MirrorsThePositionOfEveryJoint) {
+  Capture capture = PlainWalk();
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    const Extraction found = Extract(capture);
+    ASSERT_FALSE(found.general_steps.empty());
+    const std::optional<SkeletonMirror> mirror = MirrorOf(found);
+    ASSERT_TRUE(mirror.has_value());
+    const ExtractedExample& step = found.general_steps.front();
+    const ExtractedExample image =
+        MirrorExample(found.skeleton, *mirror, kGeneralStepParameters, step);
+    const std::size_t count = found.skeleton.joints.size();
+    std::vector<Vec3> from(count), to(count);
+    std::vector<Quat> rotations(count);
+    for (int f = 0; f < step.example.clip.frame_count(); ++f) {
+      ForwardKinematics(found.skeleton, step.example.clip.frame(f), from, rotations);
+      ForwardKinematics(found.skeleton, image.example.clip.frame(f), to, rotations);
+      for (std::size_t j = 0; j < count; ++j) {
+        const Vec3& partner = from[static_cast<std::size_t>(mirror->partners[j])];
+        EXPECT_LT(glm::length(to[j] - Vec3(-partner.x, partner.y, partner.z)), 2e-5f)
+            << found.skeleton.joints[j].name << ", frame " << f << ", " << seed - 1
+            << " changes of axes";
+      }
+    }
+    capture = Reframed(capture, RandomFrames(capture.skeleton, seed));
+  }
+}
+
 TEST(MirrorExample, IsItsOwnInverse) {
   const Extraction found = Extract(PlainWalk());
-  const std::optional<std::vector<int>> partners = FindMirrorJoints(found.skeleton);
-  ASSERT_TRUE(partners.has_value());
+  const std::optional<SkeletonMirror> mirror = MirrorOf(found);
+  ASSERT_TRUE(mirror.has_value());
   for (const ExtractedExample& step : found.general_steps) {
     const ExtractedExample once =
-        MirrorExample(found.skeleton, *partners, kGeneralStepParameters, step);
+        MirrorExample(found.skeleton, *mirror, kGeneralStepParameters, step);
     EXPECT_NE(once.kind, step.kind);
     EXPECT_TRUE(once.example.mirrored);
     const ExtractedExample twice =
-        MirrorExample(found.skeleton, *partners, kGeneralStepParameters, once);
+        MirrorExample(found.skeleton, *mirror, kGeneralStepParameters, once);
     EXPECT_EQ(twice.kind, step.kind);
     EXPECT_FALSE(twice.example.mirrored);
-    EXPECT_TRUE(twice.example.clip.rotations == step.example.clip.rotations);
+    ASSERT_EQ(twice.example.clip.rotations.size(), step.example.clip.rotations.size());
+    for (std::size_t i = 0; i < step.example.clip.rotations.size(); ++i) {
+      EXPECT_LT(AngleBetween(twice.example.clip.rotations[i], step.example.clip.rotations[i]),
+                1e-5);
+    }
     EXPECT_TRUE(twice.example.clip.root_positions_m == step.example.clip.root_positions_m);
     for (std::size_t i = 0; i < 7; ++i) {
       EXPECT_NEAR(twice.example.parameters[i], step.example.parameters[i], 1e-6);
@@ -446,7 +487,7 @@ TEST(FindMirrorJoints, RecognizesCommonNames) {
     for (const std::string& name : names) {
       skeleton.joints.push_back({name, skeleton.joints.empty() ? -1 : 0, Vec3(0.0f)});
     }
-    return FindMirrorJoints(skeleton);
+    return FindMirrorJoints(skeleton, Pose(skeleton.joint_count()));
   };
   EXPECT_EQ(partners({"Hips", "LHipJoint", "RHipJoint", "LowerBack", "LThumb", "RThumb"}),
             (std::vector<int>{0, 2, 1, 3, 5, 4}));
@@ -455,6 +496,14 @@ TEST(FindMirrorJoints, RecognizesCommonNames) {
   EXPECT_EQ(partners({"root", "mixamorig:LeftUpLeg", "mixamorig:RightUpLeg"}),
             (std::vector<int>{0, 2, 1}));
   EXPECT_EQ(partners({"root", "LeftUpLeg"}), std::nullopt);
+  EXPECT_EQ(partners({"pelvis", "thigh_l", "thigh_r", "calf.L", "calf.R", "Ball"}),
+            (std::vector<int>{0, 2, 1, 4, 3, 5}));
+  EXPECT_EQ(partners({"Bip01", "Bip01 L Thigh", "Bip01 R Thigh", "J_Bip_R_Foot", "J_Bip_L_Foot"}),
+            (std::vector<int>{0, 2, 1, 4, 3}));
+  EXPECT_EQ(partners({"Hips", "AnkleLeft", "AnkleRight", "HandR", "HandL", "Spine"}),
+            (std::vector<int>{0, 2, 1, 4, 3, 5}));
+  EXPECT_EQ(partners({"Hips", "LeftArm_L", "RightArm_R", "Ribs", "Lung"}),
+            (std::vector<int>{0, 2, 1, 3, 4}));
 }
 
 // Level steps blended from a walk over blocks of all heights must stay on their floor, although the

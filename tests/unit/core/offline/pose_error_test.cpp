@@ -11,7 +11,7 @@ namespace stridewire {
 namespace {
 
 std::vector<std::string> JointsOf(BodyPart part, const Skeleton& skeleton) {
-  const std::vector<BodyPart> parts = FindBodyParts(skeleton);
+  const std::vector<BodyPart> parts = FindBodyParts(skeleton, Pose(skeleton.joint_count()));
   std::vector<std::string> names;
   for (std::size_t j = 0; j < parts.size(); ++j) {
     if (parts[j] == part) names.push_back(skeleton.joints[j].name);
@@ -67,7 +67,7 @@ TEST(FindBodyParts, HandlesTheGeneratedFigure) {
 
 TEST(PoseComparison, RootShiftIsTheErrorOfEveryPart) {
   const Skeleton figure = SpreadFigure();
-  PoseComparison comparison(figure);
+  PoseComparison comparison(figure, Pose(figure.joint_count()));
   const std::vector<Pose> truth(3, Pose(figure.joint_count()));
   std::vector<Pose> other = truth;
   for (Pose& pose : other) pose.root_position_m = Vec3(0.03f, 0.0f, -0.04f);
@@ -79,7 +79,7 @@ TEST(PoseComparison, RootShiftIsTheErrorOfEveryPart) {
 
 TEST(PoseComparison, BentKneeIsAnErrorOfTheLegsOnly) {
   const Skeleton figure = SpreadFigure();
-  PoseComparison comparison(figure);
+  PoseComparison comparison(figure, Pose(figure.joint_count()));
   const std::vector<Pose> truth(2, Pose(figure.joint_count()));
   std::vector<Pose> other = truth;
   const double angle_rad = 0.4;
@@ -97,7 +97,7 @@ TEST(PoseComparison, BentKneeIsAnErrorOfTheLegsOnly) {
 
 TEST(PoseComparison, RejectsMovementsOfDifferentShape) {
   const Skeleton figure = SpreadFigure();
-  PoseComparison comparison(figure);
+  PoseComparison comparison(figure, Pose(figure.joint_count()));
   const std::vector<Pose> two(2, Pose(figure.joint_count()));
   const std::vector<Pose> three(3, Pose(figure.joint_count()));
   const std::vector<Pose> short_poses(2, Pose(figure.joint_count() - 1));
@@ -109,7 +109,7 @@ TEST(PoseComparison, RejectsMovementsOfDifferentShape) {
 TEST(PosesAtGridPoints, BlendOfOneExampleEqualsTheExample) {
   const RawLibrary raw = GenerateBuiltinLibrary();
   const auto library = LibraryBuilder().Build(raw).value();
-  PoseComparison comparison(library->skeleton());
+  PoseComparison comparison(library->skeleton(), library->stand_pose());
   for (std::size_t g = 0; g < raw.groups.size(); ++g) {
     const MotionGroup& group = library->group(static_cast<int>(g));
     ASSERT_EQ(static_cast<std::size_t>(group.example_count), raw.groups[g].examples.size());
