@@ -87,10 +87,11 @@ struct BvhReadOptions {
 ///   bend the leg are no knees. A figure that lacks a leg or has more than two is rejected. If
 ///   there is no toe joint, the ball of the foot is a fixed point in the frame of the ankle. This
 ///   point is the End Site of the foot if that is nearer than 0.2 leg lengths. Otherwise it is 2/3
-///   of the way there, at the height of the End Site.
+///   of the way there, at the height of the End Site above a flat sole.
 /// - The up axis is that of a rest pose that stands. If the rest pose does not stand, or if the
 ///   figure clearly stands and moves along another axis, it is the mean direction from ankles to
-///   hips over the motion. The rest pose is then turned to face +Z.
+///   hips over the motion. A rest pose that stands is turned to face +Z. Otherwise the frames of the
+///   joints keep their axes, except for the change of the up axis.
 /// - The unit is the common unit (m, ft, dm, 1/0.45 inch, inch, cm or mm) for which the legs are
 ///   0.68 to 1.0 m long. If no unit fits, the motion is scaled so that standing hips are at 0.95 m.
 /// - `Capture::first_frame` skips an artificial rest pose at the start. The reader assumes such a

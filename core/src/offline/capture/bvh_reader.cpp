@@ -12,6 +12,7 @@
 #include "offline/capture/bvh_file.h"
 #include "offline/capture/figure_axes.h"
 #include "offline/capture/file_axis.h"
+#include "offline/capture/foot_shape.h"
 #include "offline/capture/leg_chain.h"
 
 // Conversion from the axes and the unit of a file to ours. Let W be the rotation of the world that
@@ -28,9 +29,6 @@ namespace {
 constexpr double kStandingHipsM = 0.95;  // Hip height of a standing adult.
 constexpr double kSlowestFeetMS2 = 6.0;  // See NoteSlowMotion.
 constexpr double kMinTravelM = 0.15;
-// An End Site nearer than this to the ankle is the ball of the foot; in leg lengths.
-constexpr double kFootEndIsBall = 0.2;
-constexpr double kBallShare = 2.0 / 3.0;  // Position of the ball between ankle and toe tip.
 // The mean of positions must not move a joint of the body farther than this from its place.
 constexpr double kMaxDeviationM = 0.02;
 // A joint carries the body if the bones below it are at least this long, in leg lengths.
@@ -241,8 +239,10 @@ class Reader {
       }
     }
     MakeSignContinuous(clip);
-    for (int side = 0; side < 2; ++side)
-      SetFoot(figure_.legs.legs[side], capture_.skeleton.legs[side]);
+    for (int side = 0; side < 2; ++side) {
+      SetFootShape(figure_, axes_.rest_stands, figure_.legs.legs[side],
+                   capture_.skeleton.legs[side]);
+    }
     NoteSlowMotion();
     capture_.clip = std::move(figure_.clip);
     capture_.skeleton.joints = std::move(figure_.joints);
@@ -301,39 +301,6 @@ class Reader {
         "the feet accelerate by %.1f m/s^2 at most, which is too slow for a person (17 or more): "
         "Frame Time %.6g s may be too long; most captures have 120 frames per second",
         *p99, frame_time_s_));
-  }
-
-  // Sets the foot of `leg`, in metres and our axes.
-  void SetFoot(const FoundLeg& found, Leg& leg) {
-    STRIDEWIRE_CHECK(found.hip >= 0 && found.hip < found.knee && found.knee < found.ankle);
-    STRIDEWIRE_CHECK(found.ball < 0 || found.ball >= found.ankle);
-    leg.hip = found.hip;
-    leg.knee = found.knee;
-    leg.ankle = found.ankle;
-    if (found.ball >= 0) {
-      leg.ball = found.ball;
-      const DVec3 tip = figure_.FarthestTip(found.ball);
-      const DVec3 foot = figure_.FootVector(found);
-      leg.toe_tip_offset_m = glm::length(tip) > 0.0
-                                 ? Vec3(tip)
-                                 : Vec3(DVec3(foot.x, 0.0, foot.z) * (1.0 / kBallShare - 1.0));
-      return;
-    }
-    leg.ball = found.ankle;
-    const double leg_m = LegLength(found);
-    DVec3 tip = figure_.FarthestTip(found.ankle);
-    if (glm::length(tip) < 1e-6) {
-      tip = DVec3(0.0, -0.07, 0.24) * leg_m;
-      Note(
-          "a foot has neither a toe joint nor an End Site; its length is taken as 0.24 leg "
-          "lengths");
-    } else if (glm::length(tip) < kFootEndIsBall * leg_m) {
-      leg.ball_offset_m = Vec3(tip);
-      leg.toe_tip_offset_m = Vec3(tip.x / kBallShare, tip.y, tip.z / kBallShare);
-      return;
-    }
-    leg.ball_offset_m = Vec3(tip.x * kBallShare, tip.y, tip.z * kBallShare);
-    leg.toe_tip_offset_m = Vec3(tip);
   }
 
   BvhFile file_;

@@ -65,6 +65,7 @@ class AxesFinder {
 
   Expected<FigureAxes> Run() {
     ReadRestPose();
+    axes_.rest_stands = rest_stands_;
     FindUp();
     const DVec3 world_up = AxisVector(axes_.up);
     DVec3 rest_up = AxisVector(rest_axis_);
@@ -329,6 +330,14 @@ class AxesFinder {
     if (glm::dot(glm::cross(left, rest_up), feet) < 0.0) {
       Note("the feet point backwards; left and right may be swapped");
     }
+    const DVec3 other = std::fabs(world_up.x) > 0.9 ? DVec3(0, 0, 1) : DVec3(1, 0, 0);
+    axes_.world_turn = TurnToOurAxes(Unit(other - glm::dot(other, world_up) * world_up), world_up);
+    if (!rest_stands_) {
+      // Directions from the motion differ between the files of one figure. All files must give the
+      // same skeleton, so the frames of the joints keep their axes.
+      axes_.joint_turn = axes_.world_turn;
+      return {};
+    }
     axes_.joint_turn = TurnToOurAxes(left, rest_up);
     // The world turns like the joint frames if that makes it upright.
     const DQuat turn = glm::normalize(axes_.joint_turn * glm::conjugate(figure_.fixed_turn));
@@ -336,10 +345,6 @@ class AxesFinder {
       axes_.world_turn = turn;
     } else if ((axes_.joint_turn * world_up).y > 0.999) {
       axes_.world_turn = axes_.joint_turn;
-    } else {
-      const DVec3 other = std::fabs(world_up.x) > 0.9 ? DVec3(0, 0, 1) : DVec3(1, 0, 0);
-      axes_.world_turn =
-          TurnToOurAxes(Unit(other - glm::dot(other, world_up) * world_up), world_up);
     }
     return {};
   }

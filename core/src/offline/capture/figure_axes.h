@@ -10,10 +10,12 @@
 
 namespace stridewire {
 
-/// Rotations from the axes of a file to ours: +Y up, facing +Z at identity rotations.
+/// Rotations from the axes of a file to ours: +Y up and, if the rest pose stands, facing +Z at
+/// identity rotations.
 struct FigureAxes {
   BvhAxis up = BvhAxis::kPlusY;                  ///< The up axis of the file.
   UpSource up_source = UpSource::kOption;        ///< What determined `up`.
+  bool rest_stands = false;                      ///< The rest pose stands upright.
   DQuat world_turn = DQuat(1.0, 0.0, 0.0, 0.0);  ///< Turns the world of the file.
   DQuat joint_turn = DQuat(1.0, 0.0, 0.0, 0.0);  ///< Turns the frames of the joints.
 };

@@ -295,6 +295,13 @@ bool SameOffsets(const Skeleton& a, const Skeleton& b) {
   for (std::size_t j = 1; j < a.joints.size(); ++j) {
     if (glm::length(a.joints[j].offset_m - b.joints[j].offset_m) > 1e-5f) return false;
   }
+  // The ball of a foot without a toe joint depends on the motion of each capture.
+  for (std::size_t f = 0; f < 2; ++f) {
+    const Leg& one = a.legs[f];
+    const Leg& other = b.legs[f];
+    if (glm::length(one.ball_offset_m - other.ball_offset_m) > 1e-5f) return false;
+    if (glm::length(one.toe_tip_offset_m - other.toe_tip_offset_m) > 1e-5f) return false;
+  }
   return true;
 }
 
