@@ -482,7 +482,7 @@ TEST_P(LibraryEvaluation, SampleRunsMatchSinglePoses) {
     int poses = 0;
     int settling = 0;
     std::array<int, 2> planted{};
-    for (int tick = 0; tick < 120; ++tick) {
+    for (int tick = 0; tick < 240; ++tick) {
       crowd.Advance();
       if (tick % 3 != 0) continue;
       std::uint32_t tag = 0;
