@@ -266,8 +266,8 @@ TEST_P(QuantizedAvatars, StayWithinAMillimetre) {
   EXPECT_LE(passage.mean_bytes(), kMostBytes31Joints);
 }
 
-// Rotations are rounded in the frames of their joints, so the rounding errors and the number of bytes
-// depend on the axes of these frames. The bound of the errors does not.
+// Rotations are rounded in the frames of their joints, so the rounding errors and the number of
+// bytes depend on the axes of these frames. The bound of the errors does not.
 TEST_P(QuantizedAvatars, StayWithinTheBoundInOtherJointFrames) {
   const std::vector<std::string>& subjects = GetParam().subjects;
   const JointFrames frames = RandomFrames(skeleton(), 1);

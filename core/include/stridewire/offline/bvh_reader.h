@@ -90,8 +90,8 @@ struct BvhReadOptions {
 ///   of the way there, at the height of the End Site above a flat sole.
 /// - The up axis is that of a rest pose that stands. If the rest pose does not stand, or if the
 ///   figure clearly stands and moves along another axis, it is the mean direction from ankles to
-///   hips over the motion. A rest pose that stands is turned to face +Z. Otherwise the frames of the
-///   joints keep their axes, except for the change of the up axis.
+///   hips over the motion. A rest pose that stands is turned to face +Z. Otherwise the frames of
+///   the joints keep their axes, except for the change of the up axis.
 /// - The unit is the common unit (m, ft, dm, 1/0.45 inch, inch, cm or mm) for which the legs are
 ///   0.68 to 1.0 m long. If no unit fits, the motion is scaled so that standing hips are at 0.95 m.
 /// - `Capture::first_frame` skips an artificial rest pose at the start. The reader assumes such a

@@ -18,8 +18,8 @@ struct GridExample {
   bool mirrored = false;
 };
 
-// Samples an example at the grid points, using its own keytimes. `stand_root` is the rotation of the
-// root in the stand pose, where its heading is 0: the axes of the root's own frame do not matter.
+// Samples an example at the grid points, using its own keytimes. `stand_root` is the rotation of
+// the root in the stand pose, where its heading is 0. The axes of the root's frame do not matter.
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                                          const GridLayout& layout, const Quat& stand_root);
 

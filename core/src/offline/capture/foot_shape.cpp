@@ -16,7 +16,8 @@ constexpr double kSlowShare = 0.25;       // Fraction of the frames in which a f
 // Toe tip of a foot without any bone: this far ahead of the ankle and below it, in leg lengths.
 constexpr double kFootAhead = 0.24;
 constexpr double kFootBelow = 0.07;
-// A foot is flat at rest if it points forward and not upward by more than these shares of its length.
+// A foot is flat at rest if it points forward by at least, and upward by at most, these shares of
+// its length.
 constexpr double kRestForward = 0.7;
 constexpr double kRestUp = 0.2;
 

@@ -43,8 +43,9 @@ struct Posture {
 ///
 /// A joint and the joints that are rigid relative to it form one body. If its bones have different
 /// directions, they determine its turn. A single bone leaves a rotation about the bone open. It is
-/// chosen such that the mean posture changes as little as possible. Bones of a foot are mirrored as seen from above: a flat
-/// sole stays flat, although the balls of both feet may be at different heights.
+/// chosen such that the mean posture changes as little as possible. Bones of a foot are mirrored as
+/// seen from above: a flat sole stays flat, although the balls of both feet may be at different
+/// heights.
 [[nodiscard]] std::optional<SkeletonMirror> FindSkeletonMirror(const Skeleton& skeleton,
                                                                const Posture& posture);
 
