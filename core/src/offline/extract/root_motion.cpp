@@ -19,6 +19,7 @@ constexpr double kSlideMin_m_s = 0.2;  // Slower feet stand still and creep.
 constexpr double kTravelMinM = 0.5;    // A walk on the spot moves the ground at least this far.
 constexpr double kPelvisShare = 0.25;  // The pelvis moves at most this share of it.
 constexpr double kFootShareMin = 0.2;  // Each foot carries at least this share of it.
+constexpr double kOneWayMin = 0.5;     // At least this share of it remains after its way back.
 
 // Heights above rest of the points of both feet, and their positions.
 struct SupportPoints {
@@ -84,6 +85,13 @@ bool WalksOnTheSpot(const BodyTracks& tracks, const GroundTravel& travel) {
       travel.left_share > 1.0 - kFootShareMin) {
     return false;
   }
+  // The legs of a figure that hangs or dances swing forward as much as backward.
+  DVec3 one_way(0.0);
+  for (std::size_t i = 0; i + 1 < travel.position_m.size(); ++i) {
+    one_way +=
+        RotateYaw(-tracks.pelvis_yaw_rad[i], travel.position_m[i + 1] - travel.position_m[i]);
+  }
+  if (glm::length(one_way) < kOneWayMin * travel.length_m) return false;
   DVec3 low = tracks.pelvis_m.front();
   DVec3 high = low;
   for (const DVec3& pelvis : tracks.pelvis_m) {

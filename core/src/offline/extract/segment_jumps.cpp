@@ -184,7 +184,8 @@ bool FallsFreely(const BodyTracks& tracks, const FrameRange& flight) {
 }
 
 bool IsRun(const BodyTracks& tracks, const FootContacts& contacts, const FrameRange& flight) {
-  if (flight.size() < kRunFlightMinS * tracks.fps) return false;
+  // A flight of n frames may last half a frame longer.
+  if (flight.size() + 0.5 < kRunFlightMinS * tracks.fps) return false;
   if (TravelSpeed(tracks, flight) < kRunMin_m_s) return false;
   // A foot takes part in the take-off if it stands shortly before the flight.
   const double apart = kRunFeetApartS * tracks.fps;
