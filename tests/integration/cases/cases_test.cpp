@@ -80,6 +80,33 @@ TEST_F(Cases, BaseHasSixSteps) { EXPECT_FALSE(ExpectSixSteps(Build("m00_base.bvh
 
 TEST_F(Cases, StaticRootGivesTheSameMotion) { ExpectSame("m01_root_static.bvh"); }
 
+TEST_F(Cases, LegFramesTurnedAboutZGiveTheSameMotion) { ExpectSame("m04_knee_z180.bvh"); }
+
+TEST_F(Cases, LegFramesTurnedAboutYGiveTheSameMotion) { ExpectSame("m06_knee_y90.bvh"); }
+
+TEST_F(Cases, StepsOntoAKerbAreCounted) { (void)ExpectSixSteps(Build("m08_kerb_8cm.bvh")); }
+
+TEST_F(Cases, StepsAfterALowTPoseAreCounted) {
+  (void)ExpectSixSteps(Build("m10_tpose_30_frames_7cm_low.bvh"));
+}
+
+TEST_F(Cases, WalkInPlaceIsRefused) {
+  const ToolBuild build = Build("m11_in_place.bvh");
+  ExpectRefused(build);
+  EXPECT_THAT(build.Sentences(), HasSubstr("walks on the spot"));
+  EXPECT_THAT(build.Sentences(), HasSubstr("--root-motion"));
+}
+
+TEST_F(Cases, RootMotionIsDerivedFromTheStandingFoot) {
+  const std::string base = ExpectSixSteps(Build("m00_base.bvh"));
+  const std::string derived = ExpectSixSteps(Build("m11_in_place.bvh", {"--root-motion"}));
+  ASSERT_FALSE(base.empty() || derived.empty());
+  // The walk ends where that of the base case ends.
+  const BvhPositions a(base);
+  const BvhPositions b(derived);
+  EXPECT_NEAR(a.At(a.frame_count() - 1)[0].z, b.At(b.frame_count() - 1)[0].z, 0.1);
+}
+
 TEST_F(Cases, MissingLegIsAnError) {
   const ToolBuild build = Build("m14_one_leg.bvh");
   ExpectRefused(build);
@@ -105,6 +132,70 @@ TEST_F(Cases, SecondRootIsLeftOut) {
   (void)ExpectSixSteps(build);
   EXPECT_THAT(build.Sentences(), HasSubstr("Prop"));
   ExpectSame("m18_second_root.bvh");
+}
+
+TEST_F(Cases, LyingFigureStaysLying) {
+  const ToolBuild build = Build("m19_lying.bvh");
+  ExpectRefused(build);
+  EXPECT_THAT(build.Sentences(), Not(HasSubstr("-z")));
+  EXPECT_THAT(build.Sentences(), AnyOf(HasSubstr("lie"), HasSubstr("lying")));
+  const auto capture = ReadBvh(CaseFile("m19_lying.bvh"));
+  ASSERT_TRUE(capture.has_value()) << Describe(capture.error());
+  const ConstPoseSpan pose = capture->clip.frame(0);
+  EXPECT_NEAR(pose.root_position_m.y, 0.12, 0.01);
+  for (const Leg& leg : capture->skeleton.legs) {
+    EXPECT_NEAR(PointPosition(capture->skeleton, pose, leg.ankle, Vec3(0.0f)).y, 0.12, 0.05);
+  }
+}
+
+TEST_F(Cases, TooFastJumpIsRefusedWithAFrameRate) {
+  const ToolBuild build = Build("m22_jump_30pct_too_fast.bvh");
+  ExpectRefused(build);
+  EXPECT_EQ(build.Jumps(), 0);
+  EXPECT_THAT(build.Sentences(), HasSubstr("17"));
+  EXPECT_THAT(build.Sentences(), HasSubstr("m/s^2"));
+  EXPECT_THAT(build.Sentences(), HasSubstr("33 frames"));
+}
+
+TEST_F(Cases, WalkWithoutStandReachesAGoal) {
+  const ToolBuild build = Build("m24_walk_without_stand.bvh");
+  ASSERT_EQ(build.exit_code, 0) << build.err;
+  const ToolSynthesis synthesis =
+      SynthesizeWithTool(folder_, build.library, CaseFile("c_walk_to_3m.json"));
+  ASSERT_EQ(synthesis.exit_code, 0) << synthesis.err;
+  std::vector<std::string> kinds;
+  std::vector<double> lengths_m[2];
+  for (const json& movement : synthesis.report["movements"]) {
+    const std::string kind = movement["kind"];
+    if (!kind.starts_with("step")) continue;
+    if (!kinds.empty()) {
+      EXPECT_NE(kind, kinds.back()) << "the figure limps";
+    }
+    kinds.push_back(kind);
+    lengths_m[kind == "step_left" ? 0 : 1].push_back(
+        movement.at("measured").at("end_z_m").get<double>());
+  }
+  ASSERT_GE(kinds.size(), 4u);
+  const BvhPositions positions(synthesis.bvh);
+  const double left_z = positions.At(0, "LeftFoot").z;
+  const double right_z = positions.At(0, "RightFoot").z;
+  if (std::fabs(left_z - right_z) > 0.03) {
+    EXPECT_EQ(kinds.front(), left_z < right_z ? "step_left" : "step_right");
+  }
+  // Without the last step, which may close the feet, both feet take steps of equal length.
+  lengths_m[kinds.back() == "step_left" ? 0 : 1].pop_back();
+  double longest = 0.0;
+  double shortest = 10.0;
+  for (const std::vector<double>& lengths : lengths_m) {
+    for (const double length : lengths) {
+      longest = std::max(longest, length);
+      shortest = std::min(shortest, length);
+    }
+  }
+  EXPECT_GT(shortest, 0.5 * longest) << "the figure limps";
+  const std::vector<DVec3> last = positions.At(positions.frame_count() - 1);
+  EXPECT_NEAR(last[0].z, 3.0, 0.5 * longest);
+  EXPECT_NEAR(last[0].x, 0.0, 0.5 * longest);
 }
 
 }  // namespace

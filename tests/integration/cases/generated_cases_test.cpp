@@ -116,6 +116,16 @@ class GeneratedCases : public testing::Test {
   const ScratchFolder folder_;
 };
 
+TEST_F(GeneratedCases, RefusedFilesGetAReportWithAReason) {
+  for (const Movement movement :
+       {Movement::kOneFrame, Movement::kFrozen, Movement::kStand, Movement::kMarch,
+        Movement::kDance, Movement::kSit, Movement::kLie, Movement::kCrawl, Movement::kHang}) {
+    SCOPED_TRACE(MovementName(movement));
+    const CorpusCase file = DrawCase(movement, 11);
+    ExpectRefused(BuildWithTool(folder_, folder_.Write("case.bvh", file.bvh)));
+  }
+}
+
 TEST_F(GeneratedCases, SlowMotionGetsANote) {
   Rig rig = Walk();
   rig.fps = 0.25 * kFps;
@@ -137,6 +147,12 @@ TEST_F(GeneratedCases, StepsOfOneFootAreReportedWithTheOptionThatHelps) {
 
 TEST_F(GeneratedCases, HoveringFootIsNotAStep) {
   const ToolBuild build = Build(MakeRig(figure_, DanceOnOneLeg(figure_, kFps, 20.0)));
+  ExpectRefused(build);
+  EXPECT_THAT(build.Steps(), ElementsAre(0, 0));
+}
+
+TEST_F(GeneratedCases, CrawlingIsNotWalking) {
+  const ToolBuild build = Build(MakeRig(figure_, Crawl(figure_, kFps, 8.0)));
   ExpectRefused(build);
   EXPECT_THAT(build.Steps(), ElementsAre(0, 0));
 }
@@ -168,6 +184,21 @@ TEST_F(GeneratedCases, LyingFigureKeepsItsUpAxis) {
       EXPECT_NEAR(capture->clip.frame(f).root_position_m.y, 0.13, 0.01);
     }
   }
+}
+
+TEST_F(GeneratedCases, FeetCloseBeforeStanding) {
+  const std::string bvh = FourSteps(Build(Walk(), {}, {"--mirror"}));
+  const BvhPositions positions(bvh);
+  const int last = positions.frame_count() - 1;
+  const DVec3 apart = positions.At(last, "LeftFoot") - positions.At(last, "RightFoot");
+  EXPECT_NEAR(apart.z, 0.0, 0.03);
+  EXPECT_GT(apart.x, 0.1);
+}
+
+TEST_F(GeneratedCases, RunIsCalledARun) {
+  const ToolBuild build = Build(MakeRig(figure_, RenderGait(figure_, PlanRun(figure_, {}), kFps)));
+  ExpectRefused(build);
+  EXPECT_THAT(build.Sentences(), HasSubstr("run"));
 }
 
 TEST_F(GeneratedCases, TwistJointsAreNotKnees) {
@@ -204,6 +235,13 @@ TEST_F(GeneratedCases, FloorThatRisesByOneCentimetrePerMetreLosesNoStep) {
   }
 }
 
+TEST_F(GeneratedCases, KerbOfAnyHeightLosesNoStep) {
+  for (const double rise_m : {0.05, 0.06, 0.07, 0.08, 0.099, 0.1, -0.05, -0.08}) {
+    SCOPED_TRACE(rise_m);
+    ExpectSixSteps(Build(Walk({.rises_m = {0.0, 0.0, 0.0, rise_m}})));
+  }
+}
+
 TEST_F(GeneratedCases, WrappedRowsAreAcceptedWithANote) {
   const ToolBuild build = Build(Walk(), {.numbers_per_line = 10});
   ExpectSixSteps(build);
@@ -235,6 +273,23 @@ TEST_F(GeneratedCases, EveryRootGivesTheSameMotion) {
     Scale(0.01, rig);
     AddRoots(roots, rig);
     Scale(100.0, rig);
+    const ToolBuild build = Build(rig);
+    ExpectSixSteps(build);
+    const std::string bvh = FourSteps(build);
+    if (!bvh.empty()) {
+      EXPECT_LT(LargestJointDistance(plain, bvh), kSameMotionM);
+    }
+  }
+}
+
+TEST_F(GeneratedCases, EveryFrameOfTheJointsGivesTheSameMotion) {
+  const std::string plain = FourSteps(Build(Walk()));
+  for (const Frames frames : {Frames::kLegsDown, Frames::kLegsAside, Frames::kAlongBones,
+                              Frames::kQuarters, Frames::kRandom}) {
+    SCOPED_TRACE(static_cast<int>(frames));
+    Rig rig = Walk();
+    Random random(4);
+    ReFrame(frames, random, rig);
     const ToolBuild build = Build(rig);
     ExpectSixSteps(build);
     const std::string bvh = FourSteps(build);

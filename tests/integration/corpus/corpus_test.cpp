@@ -191,9 +191,30 @@ void ExpectRefused(Movement movement, std::initializer_list<std::string_view> wo
   }
 }
 
+TEST(Corpus, CountsWalks) { ExpectCounted(Movement::kWalk, CaseCount(0.6)); }
 TEST(Corpus, CountsJumps) { ExpectCounted(Movement::kJump, CaseCount(0.1)); }
+TEST(Corpus, RefusesRuns) { ExpectRefused(Movement::kRun, {"run"}); }
+TEST(Corpus, RefusesStanding) {
+  ExpectRefused(Movement::kStand, {"never leave the floor", "nothing moves"});
+}
+TEST(Corpus, RefusesDances) {
+  ExpectRefused(Movement::kDance, {"never leaves the floor", "never stands still on the ground"});
+}
+TEST(Corpus, RefusesSitting) { ExpectRefused(Movement::kSit, {"sits", "never leave the floor"}); }
+TEST(Corpus, RefusesLying) { ExpectRefused(Movement::kLie, {"lies"}); }
+TEST(Corpus, RefusesCrawling) {
+  ExpectRefused(Movement::kCrawl, {"crawls", "stands on hands and feet"});
+}
+TEST(Corpus, RefusesHanging) {
+  ExpectRefused(Movement::kHang,
+                {"never stand still on the ground", "something holds", "never leave the floor"});
+}
 TEST(Corpus, RefusesMarching) { ExpectRefused(Movement::kMarch, {"on the spot", "lands only"}); }
+TEST(Corpus, RefusesWalksInPlace) { ExpectRefused(Movement::kWalkInPlace, {"walks on the spot"}); }
 TEST(Corpus, ExplainsSlowWalks) { ExpectRefused(Movement::kSlowWalk, {"frame time"}, true); }
 TEST(Corpus, RefusesFastJumps) { ExpectRefused(Movement::kFastJump, {"m/s^2"}); }
+TEST(Corpus, RefusesOneFrame) { ExpectRefused(Movement::kOneFrame, {"only one usable frame"}); }
+TEST(Corpus, RefusesFrozenPoses) { ExpectRefused(Movement::kFrozen, {"nothing moves"}); }
+
 }  // namespace
 }  // namespace stridewire::test
