@@ -229,13 +229,19 @@ class StepPlanner {
            support.gap_m <= kDeepestGapM && support.rise_m <= kHighestRiseM;
   }
 
-  // Returns true if no higher ground is right in front of the toes or behind the heel.
+  // Returns true if the ground does not rise abruptly right in front of the toes or behind the
+  // heel. The slope of the ground up to there is not an abrupt rise.
   bool HasRoom(const Footprint& print) const {
     const LegRig::Side& side = library_.leg_rig().side(moving_);
-    const double ground_m = terrain_->HeightAt(print.position_m.x, print.position_m.z);
+    const auto at = [&](double forward_m) {
+      return print.position_m + RotateYaw(print.heading_rad, DVec3(0.0, 0.0, forward_m));
+    };
+    const auto height_m = [&](const DVec3& point) { return terrain_->HeightAt(point.x, point.z); };
+    const double ball_m = height_m(print.position_m);
     for (const double end_m : {side.toe_m, -side.foot_m - kSoleBehindAnkleM}) {
-      const DVec3 at = print.position_m + RotateYaw(print.heading_rad, DVec3(0.0, 0.0, end_m));
-      if (terrain_->HighestWithin(at.x, at.z, kRoomM) > ground_m + kHighestRiseM) return false;
+      const double expected_m = 2.0 * height_m(at(0.5 * end_m)) - ball_m;
+      const DVec3 end = at(end_m);
+      if (terrain_->HighestWithin(end.x, end.z, kRoomM) > expected_m + kHighestRiseM) return false;
     }
     return true;
   }
