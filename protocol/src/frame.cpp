@@ -33,25 +33,35 @@ std::string_view MessageTypeName(MessageType type) {
 
 bool IsKnown(MessageType type) { return MessageTypeName(type) != "unknown"; }
 
-bool MaySend(Sender sender, MessageType type) {
+namespace {
+
+// Properties of a message type that the schema states.
+struct Properties {
+  bool from_client = false;
+  bool from_server = false;
+  bool is_bulk = false;
+};
+
+Properties PropertiesOf(MessageType type) {
+  // NOLINTBEGIN(bugprone-branch-clone): several messages have the same properties.
   switch (type) {
-#define STRIDEWIRE_CASE(Struct, Name, from_client, from_server, ...) \
-  case MessageType::k##Name: return sender == Sender::kClient ? from_client : from_server;
+#define STRIDEWIRE_CASE(Struct, Name, ...) \
+  case MessageType::k##Name: return Properties{__VA_ARGS__};
     STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)
 #undef STRIDEWIRE_CASE
   }
-  return false;
+  // NOLINTEND(bugprone-branch-clone)
+  return {};
 }
 
-bool IsBulk(MessageType type) {
-  switch (type) {
-#define STRIDEWIRE_CASE(Struct, Name, from_client, from_server, is_bulk) \
-  case MessageType::k##Name: return is_bulk;
-    STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)
-#undef STRIDEWIRE_CASE
-  }
-  return false;
+}  // namespace
+
+bool MaySend(Sender sender, MessageType type) {
+  const Properties properties = PropertiesOf(type);
+  return sender == Sender::kClient ? properties.from_client : properties.from_server;
 }
+
+bool IsBulk(MessageType type) { return PropertiesOf(type).is_bulk; }
 
 std::size_t MaxPayloadBytes(MessageType type, const FrameLimits& limits) {
   if (IsBulk(type)) return std::min(limits.max_bulk_bytes, kMaxBulkBytes);
