@@ -26,7 +26,7 @@ constexpr double kRoughlyArrivedRad = 0.25;
 // over the swing. kMaxPlantedErrorM applies to small steps and to steps that were chosen by
 // comparison. Such a step costs kErrorWeight for each metre beyond the smaller limit.
 constexpr double kMaxErrorM = 0.16;
-constexpr double kErrorWeight = 0.25;
+constexpr double kErrorWeight = 0.35;
 // Largest difference in height, for libraries that have climbing steps.
 constexpr double kMaxErrorHeightM = 0.08;
 // The same for the heading of the body after the step, which planting cannot change.
