@@ -34,7 +34,7 @@ Orientation DrawOrientation(Random& random) {
 }
 
 void DrawExtraJoints(bool is_anonymous, Random& random, Rig& rig, std::string& text) {
-  // Without names only the shape tells what a leg is, so the rig stays plain.
+  // Without names, legs can be found by their shape only, so the rig stays plain.
   if (!is_anonymous && Chance(random, 0.2)) {
     const bool inside = Chance(random, 0.6);
     AddTwistJoints(inside ? TwistPlace::kInside : TwistPlace::kBeside, rig);
@@ -101,7 +101,7 @@ std::string DrawRig(Movement movement, Random& random, Rig& rig) {
     Translate(DVec3(random.Draw(-40, 40), random.Draw(-0.2, 0.2), random.Draw(-40, 40)), rig);
     text += "; far from the origin";
   }
-  // If the figure never stands, only a rest pose that stands tells which way is up.
+  // If the figure never stands, only a rest pose that stands shows which way is up.
   const bool rest_must_stand = movement == Movement::kSit || movement == Movement::kLie ||
                                movement == Movement::kCrawl || movement == Movement::kHang;
   DrawRoots(rest_must_stand, random, rig, text);
