@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Finds by bisection how many wandering avatars a server on this machine can handle at 60 Hz, and
-# prints that number. A crowd size passes if a run of stridewire-load fulfils no --fail-if
-# condition. Each size has two attempts, because other programs can disturb a run. Measurements are
-# printed to stderr.
+# Finds by bisection the largest number of wandering avatars that one server on this machine can
+# handle at 60 Hz, and prints it. A crowd size passes if a run of stridewire-load fulfils no
+# --fail-if condition. Each size has two attempts, because other programs can disturb a run.
+# Measurements are printed to stderr.
 #
 #   tests/bench/largest_crowd.sh
 #   tests/bench/largest_crowd.sh --from 5000 --to 40000 --within 500 --seconds 60
