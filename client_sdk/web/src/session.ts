@@ -144,8 +144,8 @@ export class Session {
   private output: ArrayBuffer[] = [];
   private outputBytes = 0;
 
-  private readonly told: (() => void)[] = [];
-  private telling = false;
+  private readonly notifications: (() => void)[] = [];
+  private notifying = false;
   private readonly rttsS: number[] = [];
   private readonly total = {
     bytesReceived: 0, poseBytesReceived: 0, bytesSent: 0, framesReceived: 0, batchesDropped: 0,
@@ -194,7 +194,7 @@ export class Session {
     this.lastErrorText = '';
     this.nextAttemptS = nowS;
     this.setState('waiting');
-    this.tell();
+    this.notify();
   }
 
   /** Ends the session with Goodbye. Commands without a reply fail with `cancelled`. */
@@ -215,7 +215,7 @@ export class Session {
     } else {
       this.setState('idle');
     }
-    this.tell();
+    this.notify();
   }
 
   joinWorld(name: string, role: Role): WorldHandle {
@@ -245,7 +245,7 @@ export class Session {
       world.state = 'refused';
       this.answerJoin(world, refusal(error));
     }
-    this.tell();
+    this.notify();
     return world;
   }
 
@@ -259,7 +259,7 @@ export class Session {
       } catch (error) {
         resolve(refusal(error));
       }
-      this.tell();
+      this.notify();
     });
   }
 
@@ -278,7 +278,7 @@ export class Session {
       } catch (error) {
         resolve(refusal(error));
       }
-      this.tell();
+      this.notify();
     });
     return {
       id,
@@ -303,7 +303,7 @@ export class Session {
       } catch (error) {
         resolve(refusal(error));
       }
-      this.tell();
+      this.notify();
     });
   }
 
@@ -331,7 +331,7 @@ export class Session {
       } catch (error) {
         resolve(refusal(error));
       }
-      this.tell();
+      this.notify();
     });
   }
 
@@ -352,7 +352,7 @@ export class Session {
       } catch (error) {
         resolve(refusal(error));
       }
-      this.tell();
+      this.notify();
     });
   }
 
@@ -369,7 +369,7 @@ export class Session {
       const deadlineS = this.heardS + inspectTimeoutS;
       this.inspections.set(nonce, {resolve, reject, deadlineS});
       this.send({type: 'InspectAvatar', nonce, world: world.serverId, avatar});
-      this.tell();
+      this.notify();
     });
   }
 
@@ -429,7 +429,7 @@ export class Session {
     this.deadlineS = nowS + this.options.connectTimeoutS;
     ++this.connection;
     this.setState('connecting');
-    this.tell();
+    this.notify();
   }
 
   onConnected(nowS: number): void {
@@ -448,7 +448,7 @@ export class Session {
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
     });
-    this.tell();
+    this.notify();
   }
 
   /** Processes a received frame. Never throws, whatever the frame contains. */
@@ -464,7 +464,7 @@ export class Session {
       this.breakOff(Status.protocol_error, error instanceof Error ? error.message : '', nowS);
     }
     this.pump();
-    this.tell();
+    this.notify();
   }
 
   /** Call it if the server sent something other than a binary message. */
@@ -472,7 +472,7 @@ export class Session {
     if (this.stateNow !== 'handshake' && this.stateNow !== 'ready') return;
     ++this.total.invalidFrames;
     this.breakOff(Status.protocol_error, text, nowS);
-    this.tell();
+    this.notify();
   }
 
   /** Call it if the connection attempt failed or the connection was lost. */
@@ -484,7 +484,7 @@ export class Session {
                this.stateNow === 'ready') {
       this.breakOff(code, text, nowS);
     }
-    this.tell();
+    this.notify();
   }
 
   /** Handles timeouts and sends pings. */
@@ -521,7 +521,7 @@ export class Session {
       default: break;
     }
     this.pump();
-    this.tell();
+    this.notify();
   }
 
   /** Returns the frames to send and removes them from the output. */
@@ -538,7 +538,7 @@ export class Session {
     if (this.stateNow === 'closing' && this.output.length === 0) {
       this.dropConnection();
       this.setState('idle');
-      this.tell();
+      this.notify();
     }
   }
 
@@ -760,14 +760,14 @@ export class Session {
     } else {
       const lost = this.hadSession;
       if (lost) this.later(() => this.listeners.emit('sessionLost'));
-      this.startAnew();
+      this.restoreSession();
     }
     this.hadSession = true;
     this.sendPing(nowS);
   }
 
   /** Restores worlds and subscriptions in a new session. */
-  private startAnew(): void {
+  private restoreSession(): void {
     this.nextSeq = 1n;
     this.resendFrom = 0n;
     this.lastEventsNumber = 0n;
@@ -814,12 +814,12 @@ export class Session {
       if (world.state === 'refused') continue;
       world.reset();
       this.setWorldState(world, 'pending');
-      this.wantAgain(world, observing);
+      this.restoreWorld(world, observing);
     }
   }
 
   /** Puts commands that restore a world's subscriptions and avatars in front of unsent commands. */
-  private wantAgain(world: WorldHandle, observing: ReadonlyMap<number, Command>): void {
+  private restoreWorld(world: WorldHandle, observing: ReadonlyMap<number, Command>): void {
     const first: Command[] = [];
     for (const [id, wanted] of world.subscriptions) {
       // The Observe of this subscription is among the unsent commands.
@@ -864,8 +864,8 @@ export class Session {
     if (world === undefined) return;
     world.serverId = message.world;
     world.setInfo(message);
-    const told = world;
-    this.later(() => told.listeners.emit('state', told.state));
+    const changed = world;
+    this.later(() => changed.listeners.emit('state', changed.state));
   }
 
   private onReply(message: ReplyMessage): void {
@@ -978,7 +978,7 @@ export class Session {
   }
 
   /** Updates `interpolationDelayS` after poses of a world were sampled for `timeS`. */
-  noteSampled(world: WorldHandle, timeS: number): void {
+  recordSample(world: WorldHandle, timeS: number): void {
     const newestS = world.view.newestTimeS;
     if (newestS === -Infinity) return;
     const behindS = newestS - timeS;
@@ -1132,7 +1132,7 @@ export class Session {
       world.spawned.clear();
       for (const wanted of world.subscriptions.values()) wanted.unsent = false;
       this.setWorldState(world, 'pending');
-      this.wantAgain(world, new Map());
+      this.restoreWorld(world, new Map());
     }
   }
 
@@ -1155,15 +1155,15 @@ export class Session {
     this.later(() => world.listeners.emit('state', state));
   }
 
-  private later(tell: () => void): void {
-    this.told.push(tell);
+  private later(notification: () => void): void {
+    this.notifications.push(notification);
   }
 
   /** Calls listeners and promises. Every public method ends with it. If a listener calls the
    * session again, notifications of that call follow after the current ones. */
-  private tell(): void {
-    if (this.telling) return;
-    this.telling = true;
+  private notify(): void {
+    if (this.notifying) return;
+    this.notifying = true;
     for (const world of this.worlds) {
       if (world.view.version !== world.notifiedVersion) {
         world.notifiedVersion = world.view.version;
@@ -1174,9 +1174,9 @@ export class Session {
         this.later(() => world.listeners.emit('terrain', world.terrain));
       }
     }
-    for (let i = 0; i < this.told.length; ++i) this.told[i]!();
-    this.told.length = 0;
-    this.telling = false;
+    for (let i = 0; i < this.notifications.length; ++i) this.notifications[i]!();
+    this.notifications.length = 0;
+    this.notifying = false;
     this.wake();
   }
 }

@@ -107,12 +107,12 @@ export class WorldHandle implements World {
   }
 
   sample(avatar: number, timeS: number, out: Pose): PoseKind {
-    this.session.noteSampled(this, timeS);
+    this.session.recordSample(this, timeS);
     return this.view.sample(avatar, timeS, out);
   }
 
   sampleAll(timeS: number, out: CrowdPose): number {
-    this.session.noteSampled(this, timeS);
+    this.session.recordSample(this, timeS);
     return this.view.sampleAll(timeS, out);
   }
 

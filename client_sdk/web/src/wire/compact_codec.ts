@@ -2,7 +2,7 @@ import {Malformed} from './malformed';
 import type {RotationQuantization as RotationCode} from './messages';
 
 const maxThreeSquared = 0.77;
-const leastToldW = 0.9;
+const leastDecodedW = 0.9;
 const rootStepM = 1 / 16384;
 const maxRootSteps = 131_071 * 16384;
 
@@ -42,7 +42,7 @@ export function checkRotationCodes(codes: readonly RotationCode[], jointCount: n
  * Checks the joints that reduced poses contain.
  * @throws Malformed they are not ascending from the root, or a joint's parent is missing
  */
-export function checkFewerJoints(joints: Uint16Array, parents: readonly number[]): void {
+export function checkReducedJoints(joints: Uint16Array, parents: readonly number[]): void {
   const wrong = (what: string, i: number): never => {
     throw new Malformed(what, 'WorldInfo.reducedJoints', i);
   };
@@ -70,27 +70,28 @@ export class CompactCodec {
   private readonly numbers: Float64Array;
 
   /**
-   * `codes` must have at least one entry and pass checkRotationCodes. `told` lists the joints that
-   * poses contain and must pass checkFewerJoints; empty: all joints. Other joints are set to their
-   * references.
+   * `codes` must have at least one entry and pass checkRotationCodes. `included` lists the joints
+   * that poses contain and must pass checkReducedJoints; empty: all joints. Other joints are set to
+   * their references.
    */
-  constructor(codes: readonly RotationCode[], told: ArrayLike<number> = []) {
-    const contained = new Set(Array.from(told));
+  constructor(codes: readonly RotationCode[], included: ArrayLike<number> = []) {
+    const contained = new Set(Array.from(included));
     this.jointCount = codes.length;
     this.bits = new Uint8Array(4 * codes.length);
     this.numbers = new Float64Array(11 * codes.length);
     let count = 0;
     codes.forEach((code, j) => {
       if (contained.size > 0 && !contained.has(j)) {
-        this.numbers.set(code.reference, 11 * j);  // If all other numbers are 0, w becomes 1.
+        // All other numbers stay 0, so that the decoded difference from the reference is 0.
+        this.numbers.set(code.reference, 11 * j);
         return;
       }
       const {smallestThreeBits: freeBits} = code;
       const bits = bitsOf(code);
       this.bits.set([freeBits, ...bits], 4 * j);
       const step = freeBits > 0 ? [1 / (Math.SQRT2 * (2 ** (freeBits - 1) - 1)), 0, 0] : code.step;
-      this.numbers.set([...code.reference, ...code.low, ...step, (leastToldW * code.leastW) ** 2],
-                       11 * j);
+      const leastW = leastDecodedW * code.leastW;
+      this.numbers.set([...code.reference, ...code.low, ...step, leastW ** 2], 11 * j);
       count += freeBits > 0 ? 2 + 3 * freeBits : bits[0] + bits[1] + bits[2];
     });
     this.poseBytes = 12 + 2 * Math.ceil(count / 16);
@@ -111,32 +112,32 @@ export class CompactCodec {
       if (steps > maxRootSteps || steps < -maxRootSteps) return false;
       rootM[rootAt + i] = steps * rootStepM;
     }
-    let held = 0;  // Number of unread bits in `window`, which are its lowest bits.
+    let unread = 0;  // Number of unread bits in `window`, which are its lowest bits.
     let window = 0;
     for (let j = 0, n = 0, to = rotationsAt; j < bits.length; j += 4, n += 11, to += 4) {
       const free = bits[j]!;
       let largest = 0;
       if (free > 0) {
-        if (held < 2) {
-          window |= words[at++]! << held;
-          held += 16;
+        if (unread < 2) {
+          window |= words[at++]! << unread;
+          unread += 16;
         }
         largest = window & 3;
         window >>>= 2;
-        held -= 2;
+        unread -= 2;
       }
       let a = 0;
       let b = 0;
       let c = 0;
       for (let k = 0; k < 3; ++k) {
         const count = free > 0 ? free : bits[j + 1 + k]!;
-        if (held < count) {
-          window |= words[at++]! << held;
-          held += 16;
+        if (unread < count) {
+          window |= words[at++]! << unread;
+          unread += 16;
         }
         const number = window & ((1 << count) - 1);
         window >>>= count;
-        held -= count;
+        unread -= count;
         let value;
         if (free > 0) {
           if (number === 0) return false;

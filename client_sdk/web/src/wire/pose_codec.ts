@@ -11,17 +11,17 @@ const leastSquared = (1 - 1e-3) ** 2;
 const mostSquared = (1 + 1e-3) ** 2;
 
 /** Flag of an avatar in a compact batch: its pose is encoded as in mode `quantised`. */
-const wide = 4;
+const uncompressedFlag = 4;
 
 /**
- * Returns the size of each compact pose in a batch of `length` bytes. Poses with the flag `wide`
- * are larger and do not count. Returns 0 if all poses are wide, and -1 if `length` does not fit.
+ * Returns the size of each compact pose in a batch of `length` bytes. Uncompressed poses are larger
+ * and do not count. Returns 0 if all poses are uncompressed, and -1 if `length` does not fit.
  */
 export function compactPoseBytes(flags: Uint8Array, length: number, jointCount: number): number {
-  let wides = 0;
-  for (let i = 0; i < flags.length; ++i) wides += (flags[i]! & wide) >> 2;
-  const rest = length - wides * poseBytes('quantised', jointCount);
-  const compact = flags.length - wides;
+  let uncompressedCount = 0;
+  for (let i = 0; i < flags.length; ++i) uncompressedCount += (flags[i]! & uncompressedFlag) >> 2;
+  const rest = length - uncompressedCount * poseBytes('quantised', jointCount);
+  const compact = flags.length - uncompressedCount;
   if (compact === 0) return rest === 0 ? 0 : -1;
   return rest >= 0 && rest % compact === 0 ? rest / compact : -1;
 }
@@ -86,12 +86,13 @@ export class PoseReader {
       this.next = 0;
       this.nextAt = 0;
     }
-    const wideWords = 6 + 3 * this.jointCount;
+    const uncompressedWords = 6 + 3 * this.jointCount;
     const compactWords = this.compactBytes >> 1;
     for (; this.next < index; ++this.next) {
-      this.nextAt += (flags[this.next]! & wide) !== 0 ? wideWords : compactWords;
+      const isUncompressed = (flags[this.next]! & uncompressedFlag) !== 0;
+      this.nextAt += isUncompressed ? uncompressedWords : compactWords;
     }
-    if ((flags[index]! & wide) !== 0) {
+    if ((flags[index]! & uncompressedFlag) !== 0) {
       return this.readQuantised(this.nextAt, rootM, rootAt, rotations, rotationsAt);
     }
     // A compact pose can only be decoded with the codec that it was encoded with.

@@ -4,7 +4,7 @@ import type {
 } from '../../generated/messages';
 import {maxRecordBytes, minResumeTokenBytes} from '../../generated/limits';
 import type {ParameterName, Parameters} from '../types';
-import {checkFewerJoints, checkRotationCodes} from './compact_codec';
+import {checkReducedJoints, checkRotationCodes} from './compact_codec';
 import {compactPoseBytes, poseBytes} from './pose_codec';
 
 export const parameterNames: readonly ParameterName[] = [
@@ -120,7 +120,7 @@ export const rules = {
     if (m.reducedJoints.length > 0 && m.rotationCodes.length === 0) {
       fail('requires rotation codes', 'reducedJoints');
     }
-    checkFewerJoints(m.reducedJoints, joints.map(({parent}) => parent));
+    checkReducedJoints(m.reducedJoints, joints.map(({parent}) => parent));
   },
 
   PoseBatch(m: PoseBatch, fail: Fail) {
