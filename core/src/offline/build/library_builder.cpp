@@ -208,11 +208,12 @@ void NoteSelection(const GroupSelection& selection, std::size_t stored, const No
 
 }  // namespace
 
-// Averaging is necessary because captured steps with equal parameters differ by centimetres, which
-// would make weights jump. The bound is a compromise: on subject 16 a bound of 2.5 cm keeps a fifth
-// of the straight and half of the general steps, and left-out steps are reproduced as well as with
-// all steps; with 4 cm they are 5 to 10 % worse. Outliers: five deviations drop a recovery after a
-// jump and the last step before a sharp turn; three would also drop first steps.
+// Averaging is necessary because captured steps with equal parameters differ by centimetres, so
+// weights would change abruptly between them. The error bound of 2.5 cm is a compromise: of subject
+// 16 it keeps a fifth of the straight and half of the general steps, and reproduces left-out steps
+// as well as all steps do. A bound of 4 cm reproduces them 5 to 10 % worse. The limit of five
+// deviations drops a recovery after a jump and the last step before a sharp turn. A limit of three
+// would also drop the first steps of walks.
 LibraryBuilder LibraryBuilder::Selecting() {
   LibraryBuilder builder;
   builder.cluster_diameter = 0.05;

@@ -78,10 +78,10 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
                                          std::vector<GridExample>& examples);
 
 // Fits the weights of a library to smooth examples [count][d], with CardinalBasisFit. With three or
-// more parameters, radii are up to 1.5 times as wide, as far as the sum of |w| at samples stays
-// within 2.4 (kMaxCorrectedWeightSum allows 2.5) and the condition below 1000. The reason is that
-// the nearest of a few scattered sites in many dimensions is much nearer than most, and with radii
-// of that distance only the linear part would act in most of the hull.
+// more parameters, it multiplies the radii by up to 1.5. The sum of |w| at samples must stay within
+// 2.4 (kMaxCorrectedWeightSum allows 2.5) and the condition below 1000. Wider radii are necessary
+// because a few sites in many dimensions are far apart, except for the nearest ones. With radii
+// equal to the distance of the nearest site, only the linear part would act in most of the hull.
 struct SmoothBasis {
   CardinalBasis basis;
   double radius_factor = 1.0;  // Factor on the dilations.

@@ -9,7 +9,7 @@
 
 namespace stridewire {
 
-/// What the reader assumed about a file, and what that depends on.
+/// Conventions that the reader assumed for a file, and the properties they were derived from.
 struct FileConventions {
   std::string path;
   BvhAxis up = BvhAxis::kPlusY;
@@ -26,7 +26,7 @@ struct FileConventions {
 struct AgreedConventions {
   std::optional<BvhAxis> up;       ///< Empty: as it was read.
   std::optional<double> unit_m;    ///< Empty: as it was read.
-  std::vector<std::string> notes;  ///< What differs from the other files, one sentence each.
+  std::vector<std::string> notes;  ///< One sentence per difference from other files.
 };
 
 /// Compares the files of one build. `files` contains the files that could be read.

@@ -19,13 +19,18 @@ constexpr double kSnapCos = 0.906;  // Directions within 25 degrees of an axis s
 // A rest pose stands if its legs point this exactly along an axis and are this straight.
 constexpr double kRestCos = 0.8;
 constexpr double kStraightShare = 0.9;
-constexpr double kMotionCos = 0.85;      // Legs hang below the hips in the motion.
-constexpr double kWeakMotionCos = 0.35;  // Legs are rather below the hips, as in crawling.
-// Distances below are in leg lengths.
-constexpr double kAtZero = 0.12;      // Largest height of a floor that is at zero.
-constexpr double kTravels = 0.6;      // A figure moves at least this far along a horizontal axis...
-constexpr double kTravelRatio = 2.0;  // ... and this many times as far as along the up axis.
-constexpr double kStays = 0.3;        // A floor that is at zero does not move farther than this.
+// Cosines of the angle between an axis and the mean direction from the feet to the hips. At least
+// kMotionCos: the figure stands along this axis. At least kWeakMotionCos: the feet are mostly on
+// this side of the hips, as in crawling.
+constexpr double kMotionCos = 0.85;
+constexpr double kWeakMotionCos = 0.35;
+// The following distances are in leg lengths.
+constexpr double kAtZero = 0.12;  // Largest distance from zero of a floor that counts as at zero.
+// A figure travels horizontally if it moves at least kTravels along that axis, and at least
+// kTravelRatio times as far as along the up axis.
+constexpr double kTravels = 0.6;
+constexpr double kTravelRatio = 2.0;
+constexpr double kStays = 0.3;  // A figure on a level floor moves less than this along the up axis.
 // Smallest difference of cosines by which the motion prefers one up axis to another.
 constexpr double kClearGain = 0.5;
 constexpr double kClearFeet = 0.5;  // Shortest sum of both unit foot vectors that point somewhere.
@@ -141,7 +146,7 @@ class AxesFinder {
                    lowest >= lowest_of_legs - kAtZero * leg_length_;
   }
 
-  // How the samples of the motion lie along an axis, in file units.
+  // The extent of the sampled motion along an axis, in file units.
   struct Extent {
     double lowest = 0.0;  // Median of the lowest joint.
     double travel = 0.0;  // Range of the root, without the outermost 5 % at both ends.
@@ -264,8 +269,8 @@ class AxesFinder {
     return sum / static_cast<double>(samples_.size());
   }
 
-  // The direction of the feet in the frame of the root, level: over the motion, or else at rest.
-  // Its length is at most 2.
+  // Returns the level direction of the feet in the frame of the root: the mean over the motion, or
+  // that of the rest pose if the motion has no clear direction. Its length is at most 2.
   template <typename Level>
   DVec3 FindFeet(const Level& level) const {
     DVec3 feet(0.0);
@@ -279,8 +284,8 @@ class AxesFinder {
     return glm::length(at_rest) > glm::length(feet) ? at_rest : feet;
   }
 
-  // The direction from the right leg to the left one, level, from the first pair of joints that are
-  // apart.
+  // Returns the level direction from the right leg to the left one, between the first pair of
+  // joints that are apart: hips, knees or ankles.
   template <typename Level>
   DVec3 FindLeft(const Level& level) const {
     const FoundLeg(&legs)[2] = figure_.legs.legs;

@@ -152,7 +152,7 @@ FoundLeg FindLegAboveAnkle(const FigureShape& figure, const std::vector<int>& jo
   FoundLeg leg{joints[0], joints[1], ankle, FindBall(figure.joints, ankle)};
   const Chain chain(figure, joints);
   const std::vector<int>& nodes = chain.nodes();
-  if (nodes.size() < 3) return leg;  // Too short to be measured; its names do not matter.
+  if (nodes.size() < 3) return leg;  // No other joint can be the knee.
   const std::size_t last = nodes.size() - 1;
   const bool is_named = std::any_of(nodes.begin() + 1, nodes.end() - 1,
                                     [&](int j) { return PartOf(figure, j) == LegPart::kKnee; });

@@ -206,7 +206,7 @@ Expected<FoundLegs> FindLegsByShape(const FigureShape& figure) {
   FoundLegs legs;
   legs.by_shape = true;
   legs.root = figure.joints[Index(best->chains[0].front())].parent;
-  int votes = 0;  // Names that say that the first chain is the left one.
+  int votes = 0;  // Joint names that agree with the first chain being left, minus the others.
   for (int side = 0; side < 2; ++side) {
     legs.legs[side] = FindLegInChain(figure, best->chains[side]);
     for (const int j : best->chains[side]) {

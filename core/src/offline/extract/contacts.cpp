@@ -12,10 +12,11 @@
 namespace stridewire {
 namespace {
 
-constexpr double kBallStillMinS = 0.03;  // A ball that rests for less time has no resting height.
-// A figure that has no foot on the ground for less time than this has not jumped.
+// The resting height of a ball is measured only if it rests for at least this time.
+constexpr double kBallStillMinS = 0.03;
+// Shorter times without a foot on the ground are not jumps.
 constexpr double kFlightMinS = 0.15;
-// A foot that rolls off slowly comes to rest for at most this time.
+// While a foot rolls off slowly, it may stop for up to this time.
 constexpr double kRollOffMaxS = 0.2;
 
 // Returns the lower quartile of the height of the ball while it rests. If only the heel touches the
@@ -37,13 +38,14 @@ double RestingBallHeight(const FootPaths& foot, const FrameRange& frames, double
   return std::min(Percentile(std::move(ball), 25.0), Percentile(std::move(below_ankle), 25.0));
 }
 
-// Completes the contacts of one foot where the other foot swings, so this foot carries the figure.
+// Closes gaps in the contacts of a foot while the other foot swings, because the figure must then
+// stand on this foot.
 class ContactBridge {
  public:
   ContactBridge(const FootPaths& foot, double fps, const ContactOptions& options)
       : foot_(foot), fps_(fps), speed_max_m_s_(options.speed_max_m_s) {}
 
-  // Extends the contacts as long as the foot stays slow on its place and the other foot swings.
+  // Extends each contact while the foot stays slow and in place and the other foot swings.
   void Extend(const std::vector<char>& other_swings, std::vector<Contact>& contacts) const {
     const int count = static_cast<int>(other_swings.size());
     for (std::size_t k = 0; k < contacts.size(); ++k) {
@@ -59,8 +61,8 @@ class ContactBridge {
     }
   }
 
-  // Joins successive contacts on one place between which the foot stays slow: while the other foot
-  // swings, and if the foot only rolls off.
+  // Joins successive contacts at one place if the foot stays slow between them, and if either the
+  // other foot swings or one of the contacts is so short that the foot was only rolling off.
   void Join(const std::vector<char>& other_swings, std::vector<Contact>& contacts) const {
     std::vector<Contact> joined;
     for (const Contact& contact : contacts) {
@@ -107,14 +109,14 @@ std::vector<char> OtherSwings(const FootPaths& other_foot, int other, double fps
   const std::vector<char> stands = StandingFrames(contacts.feet[other], count);
   const std::vector<char> self_stands = StandingFrames(contacts.feet[1 - other], count);
   std::vector<char> swings(stands.size());
-  int nobody = 0;  // Successive frames up to this one at which no foot stands.
+  int flight = 0;  // Number of frames, up to the current one, without a standing foot.
   for (int i = 0; i < count; ++i) {
     const auto k = static_cast<std::size_t>(i);
     swings[k] = !stands[k] && other_foot.slowest_m_s[k] >= options.speed_max_m_s;
-    nobody = stands[k] || self_stands[k] ? 0 : nobody + 1;
+    flight = stands[k] || self_stands[k] ? 0 : flight + 1;
     const bool lands = i + 1 < count && (stands[k + 1] || self_stands[k + 1]);
-    if (nobody > 0 && lands && nobody < kFlightMinS * fps) {
-      std::fill_n(swings.begin() + i - nobody + 1, nobody, 1);
+    if (flight > 0 && lands && flight < kFlightMinS * fps) {
+      std::fill_n(swings.begin() + i - flight + 1, flight, 1);
     }
   }
   return swings;

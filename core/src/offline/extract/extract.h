@@ -63,8 +63,8 @@ struct Extraction {
   std::vector<RejectedTime> rejected;
   /// Notes of the reader, repaired joint flips, and frames that are left out.
   std::vector<std::string> notes;
-  /// If the capture contains no step and no jump, why and what to do about it. Empty if the reasons
-  /// in `rejected` are all there is to say.
+  /// If the capture contains no step and no jump, why and what to do about it. Empty if `rejected`
+  /// gives sufficient reasons.
   std::string no_movement_reason;
   std::string error;  ///< Non-empty: the whole capture is not usable.
 

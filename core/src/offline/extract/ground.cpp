@@ -14,8 +14,9 @@ constexpr double kBallPlausibleMinM = 0.01;
 constexpr double kBallPlausibleMaxM = 0.09;
 // Contacts on one piece of level ground differ by at most this.
 constexpr double kLevelBandM = 0.03;
-constexpr double kLevelShareMin = 0.2;  // A level counts if it has this share of the contacts.
-// This deviation from the usual height outweighs all contacts.
+constexpr double kLevelShareMin = 0.2;  // Levels with a smaller share of the contacts are ignored.
+// The score of a level is its share of the contacts minus its deviation from the usual height, in
+// units of kDeviationM.
 constexpr double kDeviationM = 0.06;
 
 // Returns how much higher the right ball rests than the left one: the median over all pairs of

@@ -147,9 +147,9 @@ void MirrorFromAbove(const DVec3& up, const DVec3& image_up, std::vector<Mirrore
   bones.push_back({kNormalM * up, kNormalM * image_up});
 }
 
-// Returns the rotation that takes the bones to their images with the smallest squared error. A
-// rotation that they leave open stays as in `start`: each pass adds the current result, with the
-// weight of a bone of 1 cm, to what is to be met.
+// Returns the rotation that takes the bones to their images with the smallest squared error. Bones
+// along one line do not determine the rotation about that line; it is taken from `start`. For that
+// purpose, each pass also fits the result of the previous pass, with the weight of a 1 cm bone.
 DQuat FitTurn(std::span<const MirroredBone> bones, const DQuat& start) {
   constexpr double kStartWeightM2 = 1e-4;
   constexpr int kPasses = 10;

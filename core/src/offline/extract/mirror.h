@@ -23,7 +23,7 @@ struct SkeletonMirror {
   std::vector<DQuat> turns;
 };
 
-/// What mirroring needs to know about the posture of a figure.
+/// Properties of a figure's posture over its examples, which mirroring uses.
 struct Posture {
   /// Mean of each joint's rotation relative to its parent, and of the root's relative to the
   /// heading. The root is at the origin. The identity if there are no examples.

@@ -12,16 +12,18 @@ namespace stridewire {
 namespace {
 
 constexpr double kLevelPercentile = 3.0;
-// Points share the support in the proportion exp(-height / kFadeM).
+// The motion of each point of the feet counts with the weight exp(-height / kFadeM).
 constexpr double kFadeM = 0.005;
-constexpr double kAirM = 0.06;         // Without a point below this height, no foot supports.
-constexpr double kSlideMin_m_s = 0.2;  // Slower feet stand still and creep.
-constexpr double kTravelMinM = 0.5;    // A walk on the spot moves the ground at least this far.
-constexpr double kPelvisShare = 0.25;  // The pelvis moves at most this share of it.
-constexpr double kFootShareMin = 0.2;  // Each foot carries at least this share of it.
-constexpr double kOneWayMin = 0.5;     // At least this share of it remains after its way back.
+constexpr double kAirM = 0.06;         // If all points are higher than this, no foot supports.
+constexpr double kSlideMin_m_s = 0.2;  // Slower feet count as standing, although they creep.
+// Limits for a walk on the spot: the shortest path of the ground and, as shares of its length, the
+// longest motion of the pelvis, the least part per supporting foot and the least net displacement.
+constexpr double kTravelMinM = 0.5;
+constexpr double kPelvisShare = 0.25;
+constexpr double kFootShareMin = 0.2;
+constexpr double kOneWayMin = 0.5;
 
-// Heights above rest of the points of both feet, and their positions.
+// The ankles, balls and toe tips of both feet: their paths, and their heights at rest.
 struct SupportPoints {
   std::array<const std::vector<DVec3>*, 6> path;
   std::array<double, 6> rest_m;

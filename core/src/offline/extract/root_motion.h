@@ -6,8 +6,8 @@
 
 namespace stridewire {
 
-/// How far the ground moves below a figure, seen from its supporting foot: that foot stands still
-/// on the ground, so the ground moves as the foot does.
+/// The motion of the ground below a figure that stays in place, as on a treadmill: the supporting
+/// foot stands still on the ground, so the ground moves with it.
 struct GroundTravel {
   std::vector<DVec3> position_m;  ///< Horizontal path of the ground, one point per frame.
   double length_m = 0.0;          ///< Length of the path at the speed of a walk.

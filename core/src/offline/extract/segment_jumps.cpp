@@ -34,9 +34,9 @@ constexpr double kHangRiseM = 0.03;
 constexpr double kRunMin_m_s = 1.0;
 constexpr double kRunFlightMinS = 0.04;
 constexpr double kRunFeetApartS = 0.1;  // The feet of a runner leave the ground this much apart.
-constexpr double kPastLowestM = 0.03;   // The lowest point is past if the pelvis rose this much.
-constexpr double kNextCrouchM = 0.05;   // The next crouch has begun if it sank this much again.
-constexpr double kUprightShare = 0.6;   // The figure stands if this share of the crouch is undone.
+constexpr double kPastLowestM = 0.03;   // After this rise, the pelvis has passed its lowest point.
+constexpr double kNextCrouchM = 0.05;   // A later descent by this much begins the next crouch.
+constexpr double kUprightShare = 0.6;   // A standing figure has risen by this share of the crouch.
 constexpr double kNearlyStill = 2.5;    // Largest speed of a standing figure, times still_m_s.
 constexpr double kUnsettledMinS = 0.1;  // Shortest usable support after landing.
 

@@ -8,9 +8,11 @@
 namespace stridewire {
 namespace {
 
-constexpr double kStillM = 0.005;    // No joint of a still pose moves farther in one frame.
-constexpr double kJumpM = 0.05;      // A joint jumps at least this far,
-constexpr double kJumpFactor = 4.0;  // and this many times farther than in the next frame.
+constexpr double kStillM = 0.005;  // Joints of a still pose move at most this far per frame.
+// At a jump, a joint moves at least kJumpM, and at least kJumpFactor times as far as in the next
+// frame.
+constexpr double kJumpM = 0.05;
+constexpr double kJumpFactor = 4.0;
 
 class PoseSteps {
  public:

@@ -28,7 +28,7 @@ constexpr double kLoadMinS = 0.1;
 constexpr double kLoadShare = 0.35;
 constexpr double kStandingStillM_s = 0.15;
 constexpr double kHeldMinS = 0.1;  // In shorter flights, the acceleration of the pelvis is noise.
-// Between feet closer than this, the pelvis does not tell which one carries the weight.
+// If the feet are closer than this, the pelvis does not indicate which one carries the weight.
 constexpr double kFeetApartMinM = 0.3;
 
 // Returns the mean vertical acceleration of the pelvis over some frames, from the second difference
@@ -123,9 +123,9 @@ class SupportCheck {
 // A span of time in which at least one foot stands.
 struct StandingSpan {
   FrameRange frames;
-  double first_m = 0.0;  // Height of the ball of the foot that stands first,
-  double last_m = 0.0;   // and of the foot that stands last.
-  double lowest_m = 0.0;
+  double first_m = 0.0;   // Ball height of the first contact.
+  double last_m = 0.0;    // Ball height of the contact that ends last.
+  double lowest_m = 0.0;  // Smallest ball height of all contacts.
 };
 
 std::vector<StandingSpan> StandingSpans(const FootContacts& contacts) {
