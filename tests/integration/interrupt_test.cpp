@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -77,8 +78,12 @@ class Observer {
  private:
   static constexpr int kFramesOfJoin = 3;  // A change of velocity affects three poses.
 
+  // A change of velocity within a movement that is played at a rate other than 1 is that of the
+  // examples times the square of the rate. Dividing by it makes the figures comparable.
   void LookAtJoints() {
-    const double step = steps_.Add(avatar_.pose()).joint_rad_s;
+    if (avatar_.movement() != nullptr) rates_ = {rates_[1], avatar_.movement()->rate};
+    const double rate = std::max(rates_[0], rates_[1]);
+    const double step = steps_.Add(avatar_.pose()).joint_rad_s / (rate * rate);
     double& largest =
         frames_since_join_ < kFramesOfJoin ? figures_.largest_at_joins : figures_.largest_elsewhere;
     largest = std::max(largest, step);
@@ -109,6 +114,7 @@ class Observer {
   int frames_since_join_ = 0;
   int frames_since_cut_ = kFramesOfJoin;
   double at_cut_ = 0.0;
+  std::array<double, 2> rates_{1.0, 1.0};  // Rates of the movements in the last two frames.
   DVec3 anchors_[2];
   bool stood_[2] = {false, false};
 };
@@ -263,26 +269,107 @@ TEST_F(InterruptBuiltin, CompletesAJumpInProgress) {
   EXPECT_GT(BallPosition(avatar_.library().skeleton(), avatar_.pose(), Foot::kLeft).z, 0.9);
 }
 
-TEST_F(InterruptBuiltin, StandsAndDelayedInterruptsFinishTheMovement) {
-  for (const bool stands : {true, false}) {
-    avatar_.Teleport({});
-    ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
-    ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
-    avatar_.Advance(kTickS);
-    if (stands) {
-      InterruptWith(StandRequest{0.1});
-    } else {
-      InterruptWith(StepRequest{.length_m = 0.3}, Interrupt::kAfterMovement);
+TEST_F(InterruptBuiltin, DelayedInterruptsFinishTheMovement) {
+  ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
+  ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
+  avatar_.Advance(kTickS);
+  InterruptWith(StepRequest{.length_m = 0.3}, Interrupt::kAfterMovement);
+  EXPECT_EQ(avatar_.queue_size(), 1);
+  const auto events = AdvanceUntil([&] { return avatar_.idle(); });
+  EXPECT_EQ(std::ranges::count(events, true, &AvatarEvent::is_cut_short), 0);
+  EXPECT_EQ(std::ranges::count_if(events,
+                                  [](const AvatarEvent& event) {
+                                    return event.type == Type::kFinished && event.request_id == 1;
+                                  }),
+            1);
+}
+
+// How an avatar that walks in steps of 0.6 m answers a request that interrupts it.
+struct Response {
+  double time_s = 0.0;           // Until the avatar has done what the request asks.
+  double largest_drift_m = 0.0;  // Drift of a standing foot until then.
+};
+
+class ResponseBuiltin : public testing::Test {
+ protected:
+  // Returns the responses at 28 phases of a walk, the fastest first. `is_done` returns true when
+  // the avatar has done what the request asks.
+  template <typename Request, typename IsDone>
+  std::vector<Response> Respond(const Request& request_of, const IsDone& is_done) const {
+    std::vector<Response> responses;
+    for (int phase = 0; phase < 28; ++phase) {
+      AvatarSimulation avatar(library_, BaseFrame{});
+      for (std::uint64_t id = 1; id <= 10; ++id) {
+        EXPECT_TRUE(avatar.Enqueue({id, StepRequest{.length_m = 0.6}}).has_value());
+      }
+      for (int i = 0; i < 180 + 3 * phase; ++i) avatar.Advance(kTickS);
+      EXPECT_TRUE(avatar.Enqueue({100, request_of(avatar), Interrupt::kNow}).has_value());
+      Figures figures;
+      Observer observer(avatar, figures);
+      int ticks = 0;
+      Vec3 root = avatar.pose().root_position_m;
+      double speed_m_s = 0.0;
+      do {
+        avatar.Advance(kTickS);
+        observer.Look();
+        const Vec3 moved = avatar.pose().root_position_m - root;
+        root = avatar.pose().root_position_m;
+        speed_m_s = std::hypot(moved.x, moved.z) / kTickS;
+      } while (++ticks < 600 && !is_done(avatar, speed_m_s));
+      responses.push_back({ticks * kTickS, figures.largest_drift_m});
     }
-    EXPECT_EQ(avatar_.queue_size(), 1);
-    const auto events = AdvanceUntil([&] { return avatar_.idle(); });
-    EXPECT_EQ(std::ranges::count(events, true, &AvatarEvent::is_cut_short), 0);
-    EXPECT_EQ(std::ranges::count_if(events,
-                                    [](const AvatarEvent& event) {
-                                      return event.type == Type::kFinished && event.request_id == 1;
-                                    }),
-              1);
+    std::ranges::sort(responses, {}, &Response::time_s);
+    return responses;
   }
+
+  static void ExpectWithin(const std::vector<Response>& responses, double median_s,
+                           double longest_s) {
+    EXPECT_LE(responses[responses.size() / 2].time_s, median_s);
+    EXPECT_LE(responses.back().time_s, longest_s);
+    for (const Response& response : responses) EXPECT_LE(response.largest_drift_m, 1e-3);
+  }
+
+  // Returns the angle from the heading of the walk, which is 0, to that of the pelvis.
+  static double PelvisYaw(const AvatarSimulation& avatar) {
+    const Vec3 forward = avatar.pose().rotations[0] * Vec3(0.0f, 0.0f, 1.0f);
+    return std::fabs(std::atan2(forward.x, forward.z));
+  }
+
+  static WalkRequest WalkAlong(const AvatarSimulation& avatar, double heading_rad) {
+    return {.position_m = avatar.base().position_m +
+                          DVec3(4.0 * std::sin(heading_rad), 0.0, 4.0 * std::cos(heading_rad)),
+            .heading_rad = heading_rad};
+  }
+
+  const Library library_ = OpenLibrary("builtin").value();
+};
+
+TEST_F(ResponseBuiltin, StopsWithinAStep) {
+  const auto responses =
+      Respond([](const AvatarSimulation&) { return StandRequest{5.0}; },
+              [](const AvatarSimulation&, double speed_m_s) { return speed_m_s < 0.05; });
+  ExpectWithin(responses, 0.6, 0.8);
+}
+
+TEST_F(ResponseBuiltin, TurnsInAFewSteps) {
+  const auto turn = [&](double turn_rad) {
+    return Respond(
+        [&](const AvatarSimulation& avatar) { return WalkAlong(avatar, turn_rad); },
+        [&](const AvatarSimulation& avatar, double) { return PelvisYaw(avatar) > 0.9 * turn_rad; });
+  };
+  ExpectWithin(turn(M_PI), 2.0, 2.2);
+  ExpectWithin(turn(M_PI / 2), 1.2, 1.4);
+}
+
+TEST_F(ResponseBuiltin, JumpsSoonAfterTheRequest) {
+  const auto responses =
+      Respond([](const AvatarSimulation&) { return JumpRequest{0.8}; },
+              [](const AvatarSimulation& avatar, double) {
+                const Movement* movement = avatar.movement();
+                return avatar.started()->kind == MovementKind::kJump && movement != nullptr &&
+                       !movement->feet.foot(Foot::kLeft).IsPlanted(avatar.movement_time_s());
+              });
+  ExpectWithin(responses, 1.2, 1.5);
 }
 
 TEST_F(InterruptBuiltin, EndsWalksAndStands) {

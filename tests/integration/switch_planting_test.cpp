@@ -87,7 +87,8 @@ class Observer {
       const DVec3 ball(BallPosition(avatar_.library().skeleton(), avatar_.pose(), foot));
       if (stands && !stood_[f]) anchors_[f] = ball;
       if (stands) {
-        const bool settles = avatar_.movement_time_s() < movement->feet.plant_fade_s;
+        const bool settles =
+            avatar_.movement_time_s() < movement->start_offset_s + movement->feet.plant_fade_s;
         double& largest = settles ? figures_.largest_settling_m : figures_.largest_drift_m;
         largest = std::max(largest, std::hypot(ball.x - anchors_[f].x, ball.z - anchors_[f].z));
       }

@@ -77,9 +77,9 @@ enum class Interrupt : std::uint8_t {
   /// After the current movement. A current stand or walk ends. The queue is dropped.
   kAfterMovement,
   /// At once if both feet stand, otherwise as soon as they have landed. The queue is dropped. If a
-  /// step of the swinging foot is requested early enough in the swing
-  /// (AvatarSimulation::kLeastSwingLeft), the foot is redirected to the new footprint. A stand
-  /// request waits for the end of the movement.
+  /// step or walk that moves the swinging foot is requested early enough in the swing
+  /// (AvatarSimulation::kLeastSwingLeft), the foot is redirected to the new footprint. For a stand
+  /// or jump, the step is shortened, if possible so that it brings the feet together.
   kNow,
 };
 

@@ -69,8 +69,8 @@ void AvatarBody::CaptureFootLocks(double time_s) {
   for (FootLock& lock : locks) lock.height_m = lock.turn_rad = 0.0;
 }
 
-void AvatarBody::StartWeighted(const BaseFrame& base) {
-  stridewire::StartWeighted(group(), base, movement);
+void AvatarBody::StartWeighted(const BaseFrame& base, double rate) {
+  stridewire::StartWeighted(group(), base, movement, rate);
 }
 
 void AvatarBody::SetStartOffset(double time_s) {

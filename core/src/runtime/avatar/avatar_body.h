@@ -52,8 +52,8 @@ struct AvatarBody {
   /// first.
   void CaptureFootLocks(double time_s);
 
-  /// Starts the movement, whose weights are set, at `base`.
-  void StartWeighted(const BaseFrame& base);
+  /// Starts the movement, whose weights are set, at `base` with the playback speed `rate`.
+  void StartWeighted(const BaseFrame& base, double rate);
 
   /// Makes the movement that was just started begin at `time_s` instead of 0.
   void SetStartOffset(double time_s);

@@ -54,10 +54,10 @@ std::string DescribeRejection(const AvatarEvent& event) {
 // Plans the movement of a request. If the request needs exact placement and would miss its
 // footprint, rejects it, restores the previous state and returns false.
 bool AvatarSimulation::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                                     double swing_part, PlanScratch& scratch) {
+                                     double start_phase, PlanScratch& scratch) {
   const auto* step = std::get_if<StepRequest>(&request.movement);
   if (step == nullptr || !step->exact_only) {
-    PlanMovement(plan, swing_part, scratch);
+    PlanMovement(plan, start_phase, scratch);
     return true;
   }
   if (!body_.plants_feet) {
@@ -70,10 +70,10 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   STRIDEWIRE_CHECK(saved_.size() == 1 && plan.exact.has_value());
   saved_.front().pose = body_.pose;  // Both poses have the same size, so this does not allocate.
   std::swap(body_.movement, saved_.front().movement);
-  PlanMovement(plan, swing_part, scratch);
+  PlanMovement(plan, start_phase, scratch);
   FootprintError missed = LandingErrorFrom(*plan.exact);
   if (IsMet(missed)) return true;
-  missed = NearestInReach(*plan.exact, missed, swing_part, scratch);
+  missed = NearestInReach(*plan.exact, missed, start_phase, scratch);
   AddEvent({.type = AvatarEventType::kRejected,
             .request_id = request.id,
             .kind = group().kind,
@@ -89,7 +89,7 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
 
 // Finds the footprint nearest to the missed one that the avatar can reach exactly.
 FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
-                                                const FootprintError& missed, double swing_part,
+                                                const FootprintError& missed, double start_phase,
                                                 PlanScratch& scratch) {
   const Foot moving = MovingFoot(group().kind);
   Footprint aim = asked;
@@ -102,7 +102,7 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
         PlanRequest({.movement = StepRequest{
                          .foot = moving, .at = FootprintRequest{aim.position_m, aim.heading_rad}}});
     STRIDEWIRE_CHECK(plan.has_value() && plan->exact.has_value());
-    PlanMovement(*plan, swing_part, scratch);
+    PlanMovement(*plan, start_phase, scratch);
     error = LandingErrorFrom(*plan->exact);
   }
   const DVec3 away_m = asked.position_m - error.nearest.position_m;

@@ -1,6 +1,7 @@
 // AvatarSimulation: changes from one movement to the next, at its end or in the middle of it.
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/check.h"
 #include "runtime/avatar/avatar_simulation.h"
@@ -10,35 +11,132 @@
 
 namespace stridewire {
 
+namespace {
+
+// The swinging foot may land this far behind where it is, in metres.
+constexpr double kMaxSwingBackM = 0.06;
+// A foot that has to land early lands this far ahead of where it is, in metres.
+constexpr double kEarlyLandingM = 0.12;
+
+// Returns the share of its path that a swinging foot has covered, roughly.
+double SwingShare(double phase) {
+  const double part = std::clamp(phase - 1.0, 0.0, 1.0);
+  return part * part * (3.0 - 2.0 * part);
+}
+
+}  // namespace
+
 // Returns the movement time at which both feet are on the ground: the current time if they already
-// are, otherwise the end of the swing. A jump that has begun is always completed.
+// are, otherwise the end of the swing. A jump that has begun is always completed, and so is a step
+// that the avatar inserts for the interrupting request.
 double AvatarSimulation::LandingTime() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
-  return IsStep(group().kind) && movement_time_s_ <= swing.release_s
+  return IsStep(group().kind) && inserted_steps_ == 0 && movement_time_s_ <= swing.release_s
              ? movement_time_s_
              : std::max(movement_time_s_, swing.land_s);
 }
 
-double AvatarSimulation::MovementEnd() const {
-  return interrupts_ && !IsStartDelayed() ? std::min(LandingTime(), body_.movement.duration_s())
-                                          : body_.movement.duration_s();
+// Returns true if the current step ends in a stride, so that the feet still have to be brought
+// together.
+bool AvatarSimulation::LandsWithFeetApart() const {
+  if (!IsStep(group().kind) || !body_.movement.feet.is_active) return false;
+  const FootPlan& feet = body_.movement.feet;
+  const double heading_rad = body_.movement.base.heading_rad + body_.movement.heading_change_rad +
+                             body_.movement.extra_turn_rad;
+  const DVec3 apart = feet.foot(Foot::kLeft).to.position_m - feet.foot(Foot::kRight).to.position_m;
+  return AreFeetApart({RotateYaw(-heading_rad, apart)}, stand_feet_);
 }
 
-// Returns true if the request at the head of the queue can redirect the current swing: it moves the
-// foot that is in the air, and enough of the swing is left.
-bool AvatarSimulation::RedirectsSwing() const {
-  if (!interrupts_ || IsStartDelayed() || !IsStep(group().kind) ||
-      body_.plants_feet != foot_planting()) {
-    return false;
+double AvatarSimulation::MovementEnd() const {
+  const double end_s = body_.movement.duration_s();
+  if (!interrupts_ || IsStartDelayed()) return end_s;
+  if (std::holds_alternative<StandRequest>(queue_[queue_head_].movement)) {
+    // A stand needs a step that brings the feet together. If that is this step, it must be
+    // completed, because no pose before its end is a standing pose.
+    const bool is_stepping =
+        movement_time_s_ > SwingTimesOf(group().kind, body_.movement).release_s;
+    if (is_stepping ? !LandsWithFeetApart() : !is_walking_) return end_s;
   }
-  const auto* step = std::get_if<StepRequest>(&queue_[queue_head_].movement);
-  if (step == nullptr ||
-      step->foot.value_or(MovingFoot(group().kind)) != MovingFoot(group().kind)) {
-    return false;
-  }
+  return std::min(LandingTime(), end_s);
+}
+
+// Returns how far the current step has come: 0 at its start, 1 when the foot leaves the ground, 2
+// when it lands.
+double AvatarSimulation::StepPhase() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
-  return movement_time_s_ > swing.release_s &&
-         swing.land_s - movement_time_s_ > kLeastSwingLeft * (swing.land_s - swing.release_s);
+  return movement_time_s_ <= swing.release_s
+             ? movement_time_s_ / swing.release_s
+             : 1.0 + (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
+}
+
+// Returns true if the swinging foot can land on a footprint without swinging back.
+bool AvatarSimulation::IsAheadOfSwing(const Footprint& print, double phase) const {
+  const FootTrajectory& swing = body_.movement.feet.foot(MovingFoot(group().kind));
+  const DVec3 path = swing.to.position_m - swing.from.position_m;
+  const double length_m = std::hypot(path.x, path.z);
+  const DVec3 now = swing.from.position_m + SwingShare(phase) * path;
+  const DVec3 rest = print.position_m - now;
+  return rest.x * path.x + rest.z * path.z >= -kMaxSwingBackM * length_m;
+}
+
+// Plans a step that puts the swinging foot down shortly ahead of where it is. Returns nullopt if
+// that is hardly shorter than the current step.
+std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanEarlyLanding(
+    double phase) const {
+  const Foot moving = MovingFoot(group().kind);
+  const FootTrajectory& swing = body_.movement.feet.foot(moving);
+  const DVec3 path = swing.to.position_m - swing.from.position_m;
+  const double length_m = std::hypot(path.x, path.z);
+  const double share = SwingShare(phase) + kEarlyLandingM / std::max(length_m, kEarlyLandingM);
+  if ((1.0 - share) * length_m < kEarlyLandingM) return std::nullopt;
+  const StepRequest step{
+      .foot = moving,
+      .at = FootprintRequest{swing.from.position_m + share * path, swing.to.heading_rad}};
+  auto plan = PlanRequest({.movement = step});
+  if (!plan) return std::nullopt;
+  return Redirection{*plan, {.movement = step}, true, false};
+}
+
+// Plans how the current step changes for the request at the head of the queue: a step of the same
+// foot to where the request needs it. Returns nullopt if the step has to land first.
+std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(double phase) {
+  const MovementRequest& request = queue_[queue_head_];
+  const Foot moving = MovingFoot(group().kind);
+  if (const auto* step = std::get_if<StepRequest>(&request.movement)) {
+    if (step->foot.value_or(moving) != moving) return std::nullopt;
+    MovementRequest redirected = request;
+    std::get<StepRequest>(redirected.movement).foot = moving;
+    const auto plan = PlanRequest(redirected);
+    STRIDEWIRE_CHECK(plan.has_value());
+    return Redirection{*plan, redirected};
+  }
+  // The other requests need planted feet. While planting fades in, they wait, because feet would
+  // move when it begins to fade in again.
+  const bool is_fading =
+      movement_time_s_ < body_.movement.start_offset_s + body_.movement.feet.plant_fade_s;
+  if (!body_.plants_feet || is_fading) return std::nullopt;
+  std::optional<Redirection> redirection;
+  if (std::holds_alternative<WalkRequest>(request.movement)) {
+    WalkProgress progress = walk_;
+    const WalkDecision decision = PlanNextWalkStep(progress);
+    if (decision.outcome != WalkOutcome::kStep ||
+        MovingFoot(body_.library->group(decision.plan.group).kind) != moving ||
+        !IsAheadOfSwing(*decision.plan.exact, phase)) {
+      return std::nullopt;
+    }
+    walk_ = progress;
+    redirection = Redirection{decision.plan, {.id = request.id}};
+  } else {
+    if (inserted_steps_ > 0 || !LandsWithFeetApart()) return std::nullopt;
+    if (auto plan = PlanPlantedClosingStep(moving); plan && IsAheadOfSwing(*plan->exact, phase)) {
+      redirection =
+          Redirection{*plan, {}, true, std::holds_alternative<StandRequest>(request.movement)};
+    } else {
+      redirection = PlanEarlyLanding(phase);
+    }
+  }
+  if (redirection) redirection->plan.max_rate = kHurriedRate;
+  return redirection;
 }
 
 // Stores the state at `time_s` of the current movement that the next movement will blend from.
@@ -65,29 +163,40 @@ void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
   change_.is_redirected = is_redirected;
 }
 
-// Replaces the current step by a step of the same foot, at the same fraction of the swing. If the
-// new step is rejected, the current step continues.
-void AvatarSimulation::RedirectSwing(PlanScratch& scratch) {
-  STRIDEWIRE_CHECK(is_moving_ && interrupts_ && queue_size() > 0);
-  const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
-  const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
-  MovementRequest request = queue_[queue_head_];
-  CancelQueue();
-  auto& step = std::get<StepRequest>(request.movement);
-  step.foot = MovingFoot(group().kind);
+// Replaces the current step by a step of the same foot, at the same phase, if the request at the
+// head of the queue allows that. Returns false if it does not. If the new step is rejected, the
+// current step continues.
+bool AvatarSimulation::Redirect(PlanScratch& scratch) {
+  if (!may_redirect_ || IsStartDelayed() || !IsStep(group().kind) ||
+      body_.plants_feet != foot_planting()) {
+    return false;
+  }
+  const double phase = StepPhase();
+  // While both feet stand, the next movement may begin at once instead.
+  if (phase <= 1.0 || phase >= 2.0 - kLeastSwingLeft) return false;
+  const auto redirection = PlanRedirection(phase);
+  may_redirect_ = false;
+  if (!redirection) return false;
+  const MovementRequest& request = redirection->request;
+  if (std::holds_alternative<StepRequest>(queue_[queue_head_].movement)) CancelQueue();
+  if (redirection->ends_interrupt) interrupts_ = false;
   CaptureBlendSource(movement_time_s_);
-  const auto plan = PlanRequest(request);
-  STRIDEWIRE_CHECK(plan.has_value());
   const AvatarEvent left{.type = AvatarEventType::kFinished,
                          .request_id = request_id_,
                          .kind = group().kind,
                          .group = body_.movement.group,
                          .is_cut_short = true,
                          .base = base_};
-  if (!PlanRequested(request, *plan, part, scratch)) return;
-  AddEvent(left);
+  const AvatarChange before = change_;
   RecordLeaving(movement_time_s_, true);
-  BeginMovement(*plan, request.id);
+  if (!PlanRequested(request, redirection->plan, phase, scratch)) {
+    change_ = before;
+    return true;
+  }
+  AddEvent(left);
+  BeginMovement(redirection->plan, request.id);
+  if (redirection->is_inserted) inserted_steps_ = 1;
+  return true;
 }
 
 // Applies a change of the foot planting setting. Call it before planning a movement.

@@ -129,6 +129,14 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
   }
 }
 
+// Rejects playback speeds that no avatar uses, because keytimes are divided by them.
+template <typename Reader>
+void CheckRate(double rate, Reader& reader) {
+  if (!(rate >= kMinRate && rate <= kMaxRate)) {
+    reader.Reject("a movement record contains a playback speed that is out of range");
+  }
+}
+
 // Sets the release and landing times and the root weights of the feet, which follow from the kind
 // and the keytimes of the movement.
 void SetTimes(MovementKind kind, Movement& movement) {
@@ -203,12 +211,15 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& 
   if (has_begun) {
     double time_s = 0.0;
     double start_offset_s = 0.0;
+    double rate = 1.0;
     BaseFrame base;
     LandingDecision decision{.is_on_terrain = (flags & record::kOnTerrain) != 0};
     reader.F64(time_s);
     ReadWeights(*body_.library, movement, reader);
     reader.F64(base.heading_rad);
+    if ((flags & record::kHasRate) != 0) reader.F64(rate);
     if ((flags & record::kIsEntered) != 0) reader.F64(start_offset_s);
+    CheckRate(rate, reader);
     if (!reader.ok()) return;
     if (body_.plants_feet) {
       record::DecisionFields(reader, flags, body_.group().kind, decision);
@@ -216,7 +227,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& 
       record::Vector(reader, base.position_m);
     }
     if (!reader.ok()) return;
-    body_.StartWeighted(base);
+    body_.StartWeighted(base, rate);
     if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
           time_s >= start_offset_s)) {
       reader.Reject("a movement record begins a movement at a time outside its duration");
@@ -248,16 +259,19 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   if (body_.plants_feet) record::FootLockFields(reader, body_.locks);
   if (is_moving_) {
     BaseFrame base;
+    double rate = 1.0;
     double start_offset_s = 0.0;
     double extra_turn_rad = 0.0;
     reader.F64(movement_time_s_);
     ReadWeights(*body_.library, movement, reader);
     record::Vector(reader, base.position_m);
     reader.F64(base.heading_rad);
+    reader.F64(rate);
     reader.F64(start_offset_s);
     reader.F64(extra_turn_rad);
+    CheckRate(rate, reader);
     if (!reader.ok()) return;
-    body_.StartWeighted(base);
+    body_.StartWeighted(base, rate);
     movement.extra_turn_rad = extra_turn_rad;
     if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
           movement_time_s_ >= start_offset_s)) {

@@ -22,6 +22,11 @@ constexpr std::size_t kEventReserve = 7;
 constexpr std::size_t kUsualEvents = 3;
 // A queue keeps memory for this many requests.
 constexpr std::size_t kUsualQueue = 8;
+// Steps of walks that turn by more than this are played fast, as people turn.
+constexpr double kHurriedTurnRad = 0.25;
+// Phase at which a jump starts if it interrupts another movement. In between, the blend from the
+// previous pose replaces the start of the crouch.
+constexpr double kJumpStartPhase = 0.25;
 
 }  // namespace
 
@@ -85,8 +90,7 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
   if (request.interrupt != Interrupt::kNone) {
     CancelQueue();
     next_event_s_ = -1.0;
-    interrupts_ = request.interrupt == Interrupt::kNow && is_moving_ &&
-                  !std::holds_alternative<StandRequest>(request.movement);
+    interrupts_ = may_redirect_ = request.interrupt == Interrupt::kNow && is_moving_;
     if (is_in_stand_) stand_left_s_ = 0.0;
   }
   if (queue_size() == 0) {
@@ -131,7 +135,7 @@ int AvatarSimulation::CancelQueue() {
   queue_.clear();
   queue_head_ = 0;
   walk_ = {};
-  interrupts_ = false;
+  interrupts_ = may_redirect_ = false;
   start_not_before_s_ = 0.0;
   return dropped;
 }
@@ -248,10 +252,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     const bool may_change = events_.size() + kEventReserve <= kMaxEventsPerAdvance;
     if (is_moving_) {
       const double before_s = movement_time_s_;
-      if (may_change && RedirectsSwing()) {
-        RedirectSwing(scratch);
-        continue;
-      }
+      if (may_change && Redirect(scratch)) continue;
       const double duration_s = MovementEnd();
       if (before_s + left_s < duration_s || !may_change) {
         movement_time_s_ = before_s + left_s;
@@ -281,14 +282,16 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
 
 bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   STRIDEWIRE_CHECK(!is_moving_ && !is_in_stand_);
-  interrupts_ = false;
+  const bool is_hurried = std::exchange(interrupts_, false);
+  may_redirect_ = false;
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
   if (is_walking_ && (is_empty || stand != nullptr)) {
     // The walk ends here. Bring the feet together, so that the avatar does not stop in mid-stride.
     is_walking_ = false;
     SwitchPlanting();
-    if (const auto plan = PlanClosingStep()) {
+    if (auto plan = PlanClosingStep()) {
+      if (is_hurried) plan->max_rate = kHurriedRate;
       StartInserted(*plan, scratch);
       return true;
     }
@@ -318,23 +321,30 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
               .reason = WhyFeetAreApart()});
     return true;
   }
-  StartTransitionPath(scratch);
+  StartTransitionPath(is_hurried, scratch);
   return true;
 }
 
 // Starts the step or jump at the head of the queue, or a step that must come before it.
-void AvatarSimulation::StartTransitionPath(PlanScratch& scratch) {
+void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch) {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
-  const TransitionPath path = FindTransitionPath(
-      *body_.library, request, direct, {feet_, last_moved_, last_group_, inserted_steps_});
+  TransitionPath path = FindTransitionPath(*body_.library, request, direct,
+                                           {feet_, last_moved_, last_group_, inserted_steps_});
   if (path.is_inserted) {
+    if (is_hurried) path.plan->max_rate = kHurriedRate;
     StartInserted(*path.plan, scratch);
+    interrupts_ = is_hurried && std::holds_alternative<JumpRequest>(request.movement);
   } else if (path.plan) {
     const MovementRequest taken = request;
     PopQueue();
-    if (PlanRequested(taken, *path.plan, 0.0, scratch)) BeginMovement(*path.plan, taken.id);
+    // A jump that interrupts a walk needs less preparation, because the body is already moving.
+    const double start_phase =
+        is_hurried && body_.library->group(path.plan->group).kind == MovementKind::kJump
+            ? kJumpStartPhase
+            : 0.0;
+    if (PlanRequested(taken, *path.plan, start_phase, scratch)) BeginMovement(*path.plan, taken.id);
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
@@ -358,9 +368,9 @@ std::uint64_t AvatarSimulation::PopQueue() {
   return id;
 }
 
-// Starts the next step of the walk at the head of the queue. The request stays in the queue until
-// the walk has arrived or is rejected.
-void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
+// Plans the next step of the walk at the head of the queue, from where the feet stood when the last
+// step ended.
+WalkDecision AvatarSimulation::PlanNextWalkStep(WalkProgress& progress) const {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
@@ -372,12 +382,19 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
   stance.vector = feet_;
   stance.last_step_s = is_walking_ ? body_.movement.duration_s() : 0.0;
   stance.is_exact = body_.plants_feet;
-  stance.is_aimed = walk_.is_aimed;
-  const WalkDecision decision =
-      PlanWalkStep(*body_.library, options_.terrain.get(),
-                   std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);
+  stance.is_aimed = progress.is_aimed;
+  return PlanWalkStep(*body_.library, options_.terrain.get(),
+                      std::get<WalkRequest>(queue_[queue_head_].movement), stance, progress);
+}
+
+// Starts the next step of the walk at the head of the queue. The request stays in the queue until
+// the walk has arrived or is rejected.
+void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
+  const WalkDecision decision = PlanNextWalkStep(walk_);
   if (decision.outcome == WalkOutcome::kStep) {
-    StartPlan(decision.plan, queue_[queue_head_].id, scratch);
+    RequestPlan plan = decision.plan;
+    if (std::fabs(plan.turn_rad.value_or(0.0)) > kHurriedTurnRad) plan.max_rate = kHurriedRate;
+    StartPlan(plan, queue_[queue_head_].id, scratch);
     return;
   }
   const std::uint64_t id = PopQueue();
@@ -444,9 +461,9 @@ void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_
   BeginMovement(plan, request_id);
 }
 
-// Plans a movement. It starts with both feet on the ground or, if it interrupts a swing, at the
-// same fraction `swing_part` of its own swing.
-void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part,
+// Plans a movement. If it replaces a step of the same foot, it starts at the phase that the step
+// has reached.
+void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
                                     PlanScratch& scratch) {
   STRIDEWIRE_CHECK(&scratch.feet.library() == body_.library.get());
   STRIDEWIRE_CHECK(plan.group >= 0 &&
@@ -462,10 +479,11 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part,
                std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
                scratch.correction.weights(next), body_.movement);
   }
-  body_.StartWeighted(base_);
-  if (swing_part > 0.0) {
-    const SwingTimes swing = SwingTimesOf(next.kind, body_.movement);
-    body_.SetStartOffset(swing.release_s + swing_part * (swing.land_s - swing.release_s));
+  body_.StartWeighted(base_, 1.0);
+  const double rate = std::clamp(body_.movement.duration_s() / kQuickStepS, 1.0, plan.max_rate);
+  if (rate > 1.0) body_.StartWeighted(base_, rate);
+  if (start_phase > 0.0) {
+    body_.SetStartOffset(TimeAtPhase(SwingTimesOf(next.kind, body_.movement), start_phase));
   }
   // An avatar that was standing has no speed to keep.
   body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed(),

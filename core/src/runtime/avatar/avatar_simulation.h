@@ -175,6 +175,14 @@ class AvatarSimulation {
     std::unique_ptr<PlanScratch> scratch_;
   };
 
+  // A step that replaces the current step of the same foot while it is in progress.
+  struct Redirection {
+    RequestPlan plan;
+    MovementRequest request;     // Requested step; for other steps, the id of their request.
+    bool is_inserted = false;    // True if no request contains the step.
+    bool ends_interrupt = true;  // False if the interrupting request starts after this step.
+  };
+
   void AddEvent(const AvatarEvent& event);
   // Time is a sum of ticks, so rounding must not make a delay of whole ticks one tick longer.
   [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
@@ -192,24 +200,29 @@ class AvatarSimulation {
   [[nodiscard]] std::optional<RequestPlan> PlanPlantedClosingStep(Foot foot) const;
   [[nodiscard]] const char* WhyFeetAreApart() const;
   [[nodiscard]] bool StartNext(PlanScratch& scratch);
+  [[nodiscard]] WalkDecision PlanNextWalkStep(WalkProgress& progress) const;
   void StartWalkStep(PlanScratch& scratch);
-  void StartTransitionPath(PlanScratch& scratch);
+  void StartTransitionPath(bool is_hurried, PlanScratch& scratch);
   void StartInserted(const RequestPlan& plan, PlanScratch& scratch);
   std::uint64_t PopQueue();
   [[nodiscard]] double RiseAhead(const StepRequest& step) const;
   [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
   void StartPlan(const RequestPlan& plan, std::uint64_t request_id, PlanScratch& scratch);
-  void PlanMovement(const RequestPlan& plan, double swing_part, PlanScratch& scratch);
+  void PlanMovement(const RequestPlan& plan, double start_phase, PlanScratch& scratch);
   void BeginMovement(const RequestPlan& plan, std::uint64_t request_id);
   [[nodiscard]] bool PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                                   double swing_part, PlanScratch& scratch);
+                                   double start_phase, PlanScratch& scratch);
   [[nodiscard]] FootprintError NearestInReach(const Footprint& asked, const FootprintError& missed,
-                                              double swing_part, PlanScratch& scratch);
+                                              double start_phase, PlanScratch& scratch);
   [[nodiscard]] FootprintError LandingErrorFrom(const Footprint& asked);
   [[nodiscard]] double MovementEnd() const;
   [[nodiscard]] double LandingTime() const;
-  [[nodiscard]] bool RedirectsSwing() const;
-  void RedirectSwing(PlanScratch& scratch);
+  [[nodiscard]] bool LandsWithFeetApart() const;
+  [[nodiscard]] double StepPhase() const;
+  [[nodiscard]] std::optional<Redirection> PlanRedirection(double phase);
+  [[nodiscard]] std::optional<Redirection> PlanEarlyLanding(double phase) const;
+  [[nodiscard]] bool IsAheadOfSwing(const Footprint& print, double phase) const;
+  [[nodiscard]] bool Redirect(PlanScratch& scratch);
   void SwitchPlanting();
   void CaptureBlendSource(double time_s);
   void RecordLeaving(double time_s, bool is_redirected);
@@ -235,6 +248,8 @@ class AvatarSimulation {
   bool is_walking_ = false;
   // True if the request at the head of the queue does not wait for the end of the movement.
   bool interrupts_ = false;
+  // True until the avatar has tried to redirect the current step for that request.
+  bool may_redirect_ = false;
   bool is_exact_ = false;  // True if the current step goes to a requested footprint.
   // Number of steps that were inserted in a row, including the current movement.
   int inserted_steps_ = 0;

@@ -58,6 +58,7 @@ void WriteBegun(const AvatarSimulation& avatar, unsigned flags, const LandingDec
   writer.F64(avatar.movement_time_s());
   WriteWeights(movement, writer);
   writer.F64(movement.base.heading_rad);
+  if ((flags & record::kHasRate) != 0) writer.F64(movement.rate);
   if ((flags & record::kIsEntered) != 0) writer.F64(movement.start_offset_s);
   if (body.plants_feet) {
     record::DecisionFields(writer, flags, body.group().kind, decision);
@@ -91,6 +92,7 @@ bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
   if (change.has_begun) {
     flags |= record::kMoves;
     if (change.begun_keeps_speed) flags |= record::kKeepsSpeed;
+    if (body.movement.rate != 1.0) flags |= record::kHasRate;
     if (body.movement.start_offset_s != 0.0) flags |= record::kIsEntered;
     if (body.plants_feet) {
       decision = DecisionOf(body.group().kind, body.movement);
@@ -126,6 +128,7 @@ void AppendState(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
     WriteWeights(movement, writer);
     record::Vector(writer, movement.base.position_m);
     writer.F64(movement.base.heading_rad);
+    writer.F64(movement.rate);
     writer.F64(movement.start_offset_s);
     writer.F64(movement.extra_turn_rad);
     if (record::NeedsDifference(movement, avatar.movement_time_s())) {

@@ -35,8 +35,10 @@ enum Flag : std::uint16_t {
   kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; the record contains lift_m and normal.
   kAside = 1 << 13,      // The record contains LandingDecision::aside_m.
   kRootShift = 1 << 14,  // The record contains LandingDecision::root_shift_m.
-  // State of a standing avatar only:
-  kBeginsPlanting = 1 << 15,  // Value of AvatarBody::begins_planting.
+  // Change: the movement that began has a Movement::rate other than 1, which the record contains.
+  kHasRate = 1 << 15,
+  // State of a standing avatar: the value of AvatarBody::begins_planting.
+  kBeginsPlanting = 1 << 15,
 };
 
 template <typename Stream, typename V>

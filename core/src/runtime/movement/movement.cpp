@@ -60,15 +60,19 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
   StartWeighted(group, base, movement);
 }
 
-void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement) {
+void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement,
+                   double rate) {
   STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group.example_count));
+  STRIDEWIRE_CHECK(rate > 0.0);
   movement.base = base;
   movement.extra_turn_rad = 0.0;
   movement.start_offset_s = 0.0;
   movement.is_inertial = false;
+  movement.rate = rate;
   std::array<double, kMaxIntervals + 1> scratch;
   const auto keytimes = std::span(scratch).first(group.cells.size() + 1);
   BlendKeytimes(group.keytimes_s, movement.weights, keytimes);
+  for (double& keytime_s : keytimes) keytime_s /= rate;
   movement.warp = TimeWarp(keytimes, group.cells);
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s());
 }

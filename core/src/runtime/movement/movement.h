@@ -22,6 +22,10 @@ inline constexpr double kMaxExtraTurnRad = 0.3;
 /// Longest time over which a difference pose fades out (T in Section 5 of the paper), in seconds.
 inline constexpr double kEaseOutS = 0.2;
 
+/// Limits on the playback speed of a movement.
+inline constexpr double kMinRate = 0.5;
+inline constexpr double kMaxRate = 2.0;
+
 /// Velocity of a pose: for each joint a rotation vector per second, in the joint's own frame.
 struct PoseVelocity {
   Vec3 root_m_s = Vec3(0.0f);
@@ -40,6 +44,7 @@ struct Movement {
   /// Movement time at which it begins; above 0 if it continues a redirected swing.
   double start_offset_s = 0.0;
   double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration).
+  double rate = 1.0;                 ///< Playback speed relative to the examples, > 0.
   std::vector<float> weights;        ///< [example]: blend weights, whose sum is 1.
   Pose difference;                   ///< D = P - M(start_offset_s), in world space.
   PoseVelocity difference_velocity;  ///< Velocity of D at start_offset_s.
@@ -68,8 +73,10 @@ void SetWeights(const MotionGroup& group, int group_index, std::span<const doubl
 /// Replaces the weights [n] of a movement, and sets the heading change that follows from them.
 void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement);
 
-/// Completes StartMovement for a movement whose group, parameters and weights are set.
-void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement);
+/// Completes StartMovement for a movement whose group, parameters and weights are set. `rate`
+/// divides all keytimes, so that every time of the movement is in seconds of the avatar.
+void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement,
+                   double rate = 1.0);
 
 /// f(s) = 3(1-s)^2 - 2(1-s)^3: 1 for s <= 0, 0 for s >= 1.
 [[nodiscard]] double EaseOut(double s);

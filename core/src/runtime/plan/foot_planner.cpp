@@ -16,7 +16,7 @@ namespace stridewire {
 namespace {
 
 // In captures, the ball of a foot leaves the ground kBallLeavesS before toe-off and comes to rest
-// kBallRestsS after heel-strike.
+// kBallRestsS after heel-strike, both at the playback speed of the captures.
 constexpr double kBallLeavesS = 0.06;
 constexpr double kBallRestsS = 0.08;
 constexpr double kShortestSwingS = 0.05;
@@ -423,10 +423,16 @@ SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement) {
   const ContactKeytimes contact = ContactKeytimesOf(kind, movement.warp.interval_count());
   const double off_s = movement.warp.keytime_s(contact.toe_off);
   SwingTimes times;
-  times.release_s = std::max(off_s - kBallLeavesS, 0.5 * off_s);
-  times.land_s = std::min(movement.warp.keytime_s(contact.landing) + kBallRestsS, duration_s);
+  times.release_s = std::max(off_s - kBallLeavesS / movement.rate, 0.5 * off_s);
+  times.land_s =
+      std::min(movement.warp.keytime_s(contact.landing) + kBallRestsS / movement.rate, duration_s);
   times.release_s = std::min(times.release_s, times.land_s - kShortestSwingS);
   return times;
+}
+
+double TimeAtPhase(const SwingTimes& swing, double phase) {
+  return phase <= 1.0 ? phase * swing.release_s
+                      : swing.release_s + (phase - 1.0) * (swing.land_s - swing.release_s);
 }
 
 FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side, const Footprint& print) {
@@ -493,8 +499,9 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   if (target == nullptr) {
     movement.extra_turn_rad = decision.extra_turn_rad;
   } else if (target->request.turn_rad) {
-    movement.extra_turn_rad = std::clamp(*target->request.turn_rad - movement.heading_change_rad,
-                                         -kMaxExtraTurnRad, kMaxExtraTurnRad);
+    movement.extra_turn_rad =
+        std::clamp(*target->request.turn_rad - movement.heading_change_rad,
+                   -target->request.max_extra_turn_rad, target->request.max_extra_turn_rad);
   }
 
   constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};

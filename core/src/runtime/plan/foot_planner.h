@@ -108,4 +108,7 @@ struct SwingTimes {
 };
 [[nodiscard]] SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement);
 
+/// Returns the time of a phase: 0 is the start of the movement, 1 the release and 2 the landing.
+[[nodiscard]] double TimeAtPhase(const SwingTimes& swing, double phase);
+
 }  // namespace stridewire

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "runtime/movement/movement.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
 
@@ -30,7 +31,12 @@ struct RequestPlan {
   double most_residual_m = 0.25;
   std::optional<DVec3> root_m;     ///< Steps: position of the root at the end, seen from above.
   std::optional<double> turn_rad;  ///< Steps: the requested change of heading.
-  bool is_side_given = false;      ///< Steps: true if the request specified the side.
+  /// Steps: largest turn in addition to that of the examples, to meet `turn_rad`.
+  double max_extra_turn_rad = kMaxExtraTurnRad;
+  bool is_side_given = false;  ///< Steps: true if the request specified the side.
+  /// Largest playback speed. The movement is played as fast as is needed to shorten it to
+  /// kQuickStepS.
+  double max_rate = 1.0;
   /// True if `applied` differs from `requested` by more than 1e-6.
   bool clamped = false;
   /// Distance of `applied` from `requested` in metres; a radian counts as 0.5 m.
@@ -47,6 +53,11 @@ inline constexpr double kHullGrowth = 0.1;
 /// at the goal of a walk, that planting may distribute over the swing. Libraries without steps in
 /// place can only close their feet and turn on the spot in this way.
 inline constexpr double kMaxPlantedErrorM = 0.6;
+
+/// Limits for steps of avatars in a hurry. In captures, the quickest steps of people who turn, stop
+/// or walk briskly take 0.4 to 0.5 s.
+inline constexpr double kQuickStepS = 0.5;
+inline constexpr double kHurriedRate = 1.6;
 
 /// Plans a step in the group that spans it best, with parameters clamped to its hull. The start,
 /// which is given by the feet, has a larger weight than the end. A requested value (turn, side,

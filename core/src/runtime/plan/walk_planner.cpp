@@ -32,6 +32,10 @@ constexpr double kMaxErrorHeightM = 0.08;
 // The same for the heading of the body after the step, which planting cannot change.
 constexpr double kMaxErrorRad = 0.015;
 constexpr double kMaxLooseErrorRad = 0.5;
+// Steps of walks may turn this much more or less than the library's own steps. With
+// kMaxExtraTurnRad, libraries without steps that turn on the spot would need ten steps for a
+// half-turn.
+constexpr double kMaxWalkTurnRad = 0.6;
 // These limits apply when looking ahead. The next step itself may exceed them a little, because
 // feet do not land exactly as predicted.
 constexpr double kSlack = 1.05;
@@ -94,7 +98,7 @@ constexpr std::array<Variation, 11> kVariations{{{1.0, 0.0},
 constexpr std::array<double, 5> kComfortableTurnsRad{0.0, 0.3, -0.3, 0.6, -0.6};
 
 // Turns of steps in place.
-constexpr std::array<double, 2> kPivotTurnsRad{0.6, -0.6};
+constexpr std::array<double, 2> kPivotTurnsRad{0.8, -0.8};
 
 // Within this distance the ground at the goal is checked again, because it may have changed.
 constexpr double kGoalInSightM = 1.5;
@@ -303,7 +307,7 @@ class StepPlanner {
     const double wanted_rad = print.heading_rad - stance_.heading_rad;
     const double natural_rad = NaturalTurn(group, plan->applied);
     const double turn_rad =
-        std::clamp(wanted_rad, natural_rad - kMaxExtraTurnRad, natural_rad + kMaxExtraTurnRad);
+        std::clamp(wanted_rad, natural_rad - kMaxWalkTurnRad, natural_rad + kMaxWalkTurnRad);
     // A library with climbing steps need not land on another height with a level step.
     const double error_y = applied_or(ParameterName::kEndY, 0.0) - GroundRise(wanted.y);
     if (is_strict_ && profile_.has_climbs && std::fabs(error_y) > kMaxErrorHeightM) {
@@ -315,6 +319,7 @@ class StepPlanner {
             reach * (is_strict_ ? kMaxErrorRad : kMaxLooseErrorRad)) {
       return std::nullopt;
     }
+    plan->max_extra_turn_rad = kMaxWalkTurnRad;
     plan->most_residual_m = reach * kMaxPlantedErrorM;
     if (!strides || step.is_last) plan->root_m = step.root_m;
     return PlannedStep{.plan = *plan,

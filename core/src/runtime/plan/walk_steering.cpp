@@ -14,8 +14,8 @@ struct TurnLimits {
   double out_rad;
   double in_rad;
 };
-constexpr TurnLimits kWalkTurn{0.6, 0.35};
-constexpr TurnLimits kSpotTurn{0.85, 0.3};
+constexpr TurnLimits kWalkTurn{0.7, 0.5};
+constexpr TurnLimits kSpotTurn{1.0, 0.7};
 
 // A waypoint counts as passed within this distance.
 constexpr double kPassWaypointM = 0.35;
