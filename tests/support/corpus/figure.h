@@ -36,6 +36,8 @@ enum class Part {
 };
 inline constexpr int kPartCount = 21;
 inline constexpr double kDegree = std::numbers::pi / 180.0;
+/// Sideways distance of a foot from the middle of both feet, at scale 1.
+inline constexpr double kHalfTrackM = 0.10;
 
 /// Rotations by an angle about the x axis (positive bends forward), y axis (positive turns left)
 /// and z axis.

@@ -9,10 +9,9 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr double kGravity = 9.81;
-constexpr double kHalfTrackM = 0.10;  // Sideways distance of a foot from the path, at scale 1.
-constexpr int kLeadSteps = 2;         // Steps before and after the recorded part of a cut walk.
-constexpr double kReach = 0.985;      // Largest distance from hip to ankle, in leg lengths.
-constexpr double kRollS = 0.3;        // The heel rises for this time before the foot leaves.
+constexpr int kLeadSteps = 2;     // Steps before and after the recorded part of a cut walk.
+constexpr double kReach = 0.985;  // Largest distance from hip to ankle, in leg lengths.
+constexpr double kRollS = 0.3;    // The heel rises for this time before the foot leaves.
 constexpr double kSwayRad = 4.0 * kDegree;
 constexpr double kArmSwingRad = 20.0 * kDegree;
 

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
 
 namespace stridewire::test {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
-constexpr double kHalfTrackM = 0.10;
 
 double SideOf(int foot) { return foot == 0 ? 1.0 : -1.0; }
 
@@ -97,7 +95,7 @@ FigureMotion Lie(const Figure& figure, double fps, double seconds) {
   return Sample(fps, seconds, [&](double t) {
     FigurePose pose;
     pose.pelvis_m = DVec3(0.0, 0.13 * figure.scale(), 0.0);
-    pose.pelvis = AboutX(-0.5 * kPi) * AboutY(10.0 * kDegree * std::sin(1.2 * t));
+    pose.pelvis = AboutX(-0.5 * std::numbers::pi) * AboutY(10.0 * kDegree * std::sin(1.2 * t));
     StretchLegs(figure, 0.05 * std::sin(1.7 * t), 0.05 * std::sin(1.3 * t + 1.0), pose);
     pose.HangArms(0.05 * std::sin(t));
     return pose;
@@ -118,7 +116,7 @@ FigureMotion Crawl(const Figure& figure, double fps, double seconds) {
       const double done = 2.0 * std::floor(0.5 * cycle);
       const double u = cycle - done - 1.0;
       const double ahead = kStepM * (done + 2.0 * Ease(u) - foot - 0.5);
-      const double lift = u > 0.0 ? 0.04 * std::sin(kPi * u) : 0.0;
+      const double lift = u > 0.0 ? 0.04 * std::sin(std::numbers::pi * u) : 0.0;
       FigurePose::LegPose& leg = pose.legs[static_cast<std::size_t>(foot)];
       const double x = SideOf(foot) * 0.09 * figure.scale();
       leg.ankle_m = DVec3(x, 0.06 + lift, ahead - 0.98 * half_leg);
@@ -126,7 +124,7 @@ FigureMotion Crawl(const Figure& figure, double fps, double seconds) {
       leg.knee_towards = DVec3(0.0, -1.0, 0.3);
       FigurePose::ArmPose& arm = pose.arms[static_cast<std::size_t>(foot)];
       arm.arm = AboutY(-SideOf(foot) * 90.0 * kDegree) *
-                AboutZ(0.25 * SideOf(foot) * std::sin(kPi * cycle));
+                AboutZ(0.25 * SideOf(foot) * std::sin(std::numbers::pi * cycle));
     }
     return pose;
   });
