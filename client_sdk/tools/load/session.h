@@ -70,8 +70,6 @@ class Session {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool finished() const { return state_ == State::kFinished; }
   [[nodiscard]] std::uint64_t reconnect_count() const { return reconnect_count_; }
-  /// Returns whether the operating system has accepted all messages.
-  [[nodiscard]] bool all_sent() const { return writing_.empty() && waiting_.empty(); }
 
  protected:
   /// Sends a message. Closes the connection if the message cannot be encoded or if too many bytes

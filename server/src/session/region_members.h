@@ -33,12 +33,6 @@ class RegionMembers {
   /// they are in the new region.
   void Set(const protocol::Region& region, double default_leave_m, std::uint16_t every_n_ticks,
            protocol::PoseMode mode);
-  /// Replaces the mode of each ring with `function(mode)`.
-  template <typename Function>
-  void MapModes(Function&& function) {
-    for (Ring& ring : std::span(rings_).first(ring_count_)) ring.mode = function(ring.mode);
-    CombineIntervals();
-  }
 
   /// Returns the modes of all rings, each once.
   [[nodiscard]] std::vector<protocol::PoseMode> modes() const;

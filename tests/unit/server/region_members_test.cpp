@@ -257,7 +257,6 @@ TEST(RegionMembers, AreDueInTheModeOfTheirRing) {
   EXPECT_GT(left_count, 50);
 }
 
-// If levels of detail are not available any more, all rings have the same mode.
 TEST(RegionMembers, OfOneModeHaveOneFilterForTheRegion) {
   RegionMembers members;
   protocol::Region region{{1.0, 2.0}, 20.0, 5.0, {{6.0, 2}}, {}};
@@ -267,10 +266,6 @@ TEST(RegionMembers, OfOneModeHaveOneFilterForTheRegion) {
   region.ring_details = {protocol::PoseDetail::kAll};
   members.Set(region, 8.0, 4, PoseMode::kCompactRoot);
   EXPECT_NE(members.filter(PoseMode::kCompactRoot), region_filter);
-  members.MapModes([](PoseMode) { return PoseMode::kQuantised; });
-  EXPECT_THAT(members.modes(), ElementsAre(PoseMode::kQuantised));
-  EXPECT_EQ(members.interval(PoseMode::kQuantised), 2);
-  EXPECT_EQ(members.filter(PoseMode::kQuantised), region_filter);
 }
 
 TEST(RegionMembers, EnterWithTheirFirstPose) {
