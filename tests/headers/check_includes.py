@@ -21,6 +21,7 @@ CORE_ROOMS = [
     "runtime/skeleton", "runtime/terrain", "runtime/library", "runtime/movement", "runtime/pose",
     "runtime/weights", "runtime/plan", "runtime/avatar",
     "offline/base", "offline/capture", "offline/extract", "offline/build", "offline/builtin",
+    "offline/complete",
     "offline/choreography", "offline/inspect",
 ]
 

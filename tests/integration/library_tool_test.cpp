@@ -526,8 +526,9 @@ TEST_F(LibraryTool, BuildReportsAsOneJsonObject) {
   ASSERT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.err, IsEmpty());
   const json report = ParseOutput(result.out);
-  EXPECT_THAT(Keys(report), testing::UnorderedElementsAre("error", "files", "summary", "self_check",
-                                                          "notes", "selection", "library"));
+  EXPECT_THAT(Keys(report),
+              testing::UnorderedElementsAre("error", "files", "completion", "summary", "self_check",
+                                            "notes", "selection", "library"));
   EXPECT_EQ(report["error"], nullptr);
   EXPECT_EQ(report["files"][0]["reason"], nullptr);
   for (const char* key : {"path", "frames", "fps", "unit_m", "steps_left", "steps_right", "jumps",
@@ -586,6 +587,33 @@ TEST_F(LibraryTool, BuildPrintsInTextWhatItReportsAsJson) {
   for (const json& note : report["files"][0]["notes"]) {
     EXPECT_THAT(text.out, HasSubstr(note.get<std::string>()));
   }
+}
+
+TEST_F(LibraryTool, BuildCompletesLibrariesUnlessToldNotTo) {
+  const Arguments arguments = {"build", "--out", Out(), kSteps};
+  const json completed = ParseOutput(Tool(Join(arguments, {"--json"})).out);
+  const json plain = ParseOutput(Tool(Join(arguments, {"--json", "--no-complete"})).out);
+  const json& completion = completed["completion"];
+  EXPECT_GT(completion["examples"].get<int>(), 0);
+  EXPECT_THAT(completion["lacking"], Contains("steps backward"));
+  EXPECT_GT(completed["summary"]["back_steps"]["left"]["completed"].get<int>(), 0);
+  EXPECT_EQ(plain["completion"], nullptr);
+  EXPECT_EQ(plain["summary"]["steps"]["completed"], 0);
+  // Captured groups keep their examples. Figures differ in the last digits, because the root is
+  // stored relative to the stand pose, which may be a composed one.
+  const std::size_t captured = plain["library"]["groups"].size();
+  ASSERT_GT(completed["library"]["groups"].size(), captured);
+  for (std::size_t g = 0; g < captured; ++g) {
+    for (const char* key : {"kind", "examples", "duration_s"}) {
+      EXPECT_EQ(completed["library"]["groups"][g][key], plain["library"]["groups"][g][key]) << key;
+    }
+  }
+  const ProgramResult text = Tool(arguments);
+  for (const json& sentence : completion["sentences"]) {
+    EXPECT_THAT(text.out, HasSubstr(sentence.get<std::string>()));
+  }
+  ASSERT_EQ(Tool(arguments).exit_code, 0);
+  EXPECT_THAT(Tool({"inspect", Out(), "--examples"}).out, HasSubstr("completed step"));
 }
 
 TEST_F(LibraryTool, BuildCanSkipTheSelfCheck) {

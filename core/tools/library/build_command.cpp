@@ -9,6 +9,7 @@
 #include "command_line.h"
 #include "commands.h"
 #include "offline/capture/conventions.h"
+#include "offline/complete/complete_library.h"
 #include "offline/extract/assemble.h"
 #include "progress.h"
 #include "stridewire/offline/bvh_reader.h"
@@ -183,8 +184,9 @@ int RunBuild(const BuildCommand& command) {
 
   progress.Update(static_cast<double>(command.files.size()) /
                   static_cast<double>(command.files.size() + 1));
-  const auto raw = captures->assembler.Assemble();
+  auto raw = captures->assembler.Assemble();
   if (!raw) return report.Fail(Describe(raw.error()), kExitBadInput);
+  if (!command.no_complete && options.steps) report.AddCompletion(CompleteLibrary(*raw));
   LibraryBuilder builder = command.all ? LibraryBuilder() : LibraryBuilder::Selecting();
   if (!command.all) builder.selection.max_pose_error_m = command.max_pose_error_m;
   const auto library = builder.Build(*raw);

@@ -88,7 +88,7 @@ std::string WithPath(const Extraction& extraction) {
 BuildReport::BuildReport(bool as_json) : as_json_(as_json) {
   json_["error"] = nullptr;
   json_["files"] = Json::array();
-  for (const char* key : {"summary", "self_check"}) json_[key] = nullptr;
+  for (const char* key : {"completion", "summary", "self_check"}) json_[key] = nullptr;
   json_["notes"] = Json::array();
   json_["selection"] = Json::array();
   json_["library"] = nullptr;
@@ -99,6 +99,17 @@ void BuildReport::AddFile(const Extraction& extraction, const AssembleOptions& o
   json_["files"].push_back(FileToJson(extraction, reason));
   if (!as_json_) PrintFile(extraction, reason);
   if (!extraction.error.empty()) PrintError(WithPath(extraction));
+}
+
+void BuildReport::AddCompletion(const Completion& completion) {
+  const std::vector<std::string> sentences = DescribeCompletion(completion);
+  json_["completion"] = {{"sentences", sentences},
+                         {"lacking", completion.lacking},
+                         {"examples", completion.example_count},
+                         {"composed_stand", completion.has_composed_stand}};
+  if (as_json_) return;
+  std::printf("\nCompletion:\n");
+  for (const std::string& sentence : sentences) std::printf("  %s\n", sentence.c_str());
 }
 
 void BuildReport::AddLibrary(const std::string& path,

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "offline/complete/complete_library.h"
 #include "offline/extract/assemble.h"
 #include "offline/extract/extract.h"
 #include "stridewire/offline/library_builder.h"
@@ -18,6 +19,9 @@ class BuildReport {
 
   // Reports on a file, and prints on stderr why the file is unusable if it is.
   void AddFile(const Extraction& extraction, const AssembleOptions& options);
+
+  // Reports which movements the captures lack, and which were generated instead.
+  void AddCompletion(const Completion& completion);
 
   // Reports on the library written to `path`: its groups, notes and summary and, unless
   // `skips_self_check`, its self-check.

@@ -16,6 +16,7 @@ struct BuildCommand {
   bool root_motion = false;
   bool all = false;
   double max_pose_error_m = 0.025;
+  bool no_complete = false;
   bool no_self_check = false;
   bool json = false;
   std::optional<double> unit_m;  // Empty: detected.

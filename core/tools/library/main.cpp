@@ -136,6 +136,9 @@ int Run(int argc, char** argv) {
       ->check(Number(0.0, 10.0, false))
       ->capture_default_str()
       ->excludes("--all");
+  build_app->add_flag(
+      "--no-complete", build.no_complete,
+      "Do not generate basic steps that the captures lack, such as stops and turns");
   build_app->add_flag("--no-self-check", build.no_self_check,
                       "Do not play and check a few movements with the finished library");
   AddJson(build_app, build.json);

@@ -27,6 +27,9 @@ struct RawGroup {
   MovementKind kind = MovementKind::kStepLeft;
   std::vector<ParameterName> parameters;
   std::vector<RawExample> examples;
+  /// True if all examples were generated because the captures lack such movements. LibraryBuilder
+  /// stores them all, and requests use them only where captured groups do not fit.
+  bool is_completed = false;
 };
 
 /// A clip for a LayerClip, which is blended over movements. It animates all joints of the skeleton.

@@ -110,6 +110,10 @@ struct GridLayout {
 /// Number of floats in the longest possible grid row.
 inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 
+/// Sources of examples that were generated because the captures lack such movements begin with
+/// this text.
+inline constexpr std::string_view kCompletedSource = "completed";
+
 /// Examples that can be blended with each other. They have the same kind, parameters, number of
 /// keytimes and grid. All spans point into the bytes of the library.
 ///
@@ -141,6 +145,8 @@ struct MotionGroup {
   /// [example]: origin, for example "16_21.bvh 0.93-1.47 s".
   std::vector<std::string_view> sources;
   std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if it is a mirrored copy, else 0.
+  /// True if the sources of all examples begin with kCompletedSource. Requests prefer other groups.
+  bool is_completed = false;
 
   [[nodiscard]] int parameter_count() const { return static_cast<int>(parameters.size()); }
   [[nodiscard]] int interval_count() const { return static_cast<int>(cells.size()); }

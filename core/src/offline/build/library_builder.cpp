@@ -259,15 +259,18 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     for (std::size_t l = 0; l < units.size(); ++l) {
       if (group.parameters[l] == ParameterName::kTurn) units[l] = kMetresPerRadian;
     }
-    const double diameter = std::max(cluster_diameter, 10.0 * kMinSiteDistance);
+    // Generated examples have no individual variation, so there is nothing to average or to drop.
+    const bool selects = !group.is_completed;
+    const double diameter = std::max(selects ? cluster_diameter : 0.0, 10.0 * kMinSiteDistance);
+    const SelectionOptions& options = selects ? selection : SelectionOptions();
     Selected selected =
-        SelectExamplesJob{found, units, diameter, selection, layout, raw.skeleton, group}.Run();
+        SelectExamplesJob{found, units, diameter, options, layout, raw.skeleton, group}.Run();
     std::vector<GridExample> examples = std::move(selected.examples);
     selected.report.group = static_cast<int>(g);
     STRIDEWIRE_CHECK(!examples.empty() && examples.size() == selected.clusters.size());
     NoteSelection(selected.report, examples.size(), note);
     std::optional<Smoothness> smoothness;
-    if (smooths) {
+    if (smooths && selects) {
       smoothness =
           Smooth(group, std::move(found), selected.report, cells, layout, raw.skeleton, examples);
     }

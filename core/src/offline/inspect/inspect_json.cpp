@@ -10,7 +10,8 @@ using Json = nlohmann::ordered_json;
 Json OriginsToJson(const ExampleOrigins& origins) {
   return {{"captured", origins.captured},
           {"mirrored", origins.mirrored},
-          {"generated", origins.generated}};
+          {"generated", origins.generated},
+          {"completed", origins.completed}};
 }
 
 Json RangeToJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }

@@ -31,6 +31,7 @@ void Add(Ability& ability, const ExampleOrigins& origin, double value) {
   ability.origins.captured += origin.captured;
   ability.origins.mirrored += origin.mirrored;
   ability.origins.generated += origin.generated;
+  ability.origins.completed += origin.completed;
 }
 
 Ability& Of(LibrarySummary::Sides& sides, Foot foot) {
@@ -86,9 +87,12 @@ class Summarizer {
       const bool is_generated = source.starts_with("generated");
       const std::string key(MovementKindName(group.kind));
       if (!seen_.insert({key + " " + FirstSource(source), is_mirrored}).second) continue;
-      const ExampleOrigins origin{.captured = !is_generated && !is_mirrored ? 1 : 0,
-                                  .mirrored = !is_generated && is_mirrored ? 1 : 0,
-                                  .generated = is_generated ? 1 : 0};
+      const bool is_completed = source.starts_with(kCompletedSource);
+      const bool is_captured = !is_generated && !is_completed;
+      const ExampleOrigins origin{.captured = is_captured && !is_mirrored ? 1 : 0,
+                                  .mirrored = is_captured && is_mirrored ? 1 : 0,
+                                  .generated = is_generated ? 1 : 0,
+                                  .completed = is_completed ? 1 : 0};
       if (IsStep(group.kind)) {
         AddStep(MovingFoot(group.kind), Measure(group, e), origin);
       } else if (group.kind == MovementKind::kJump) {
@@ -137,6 +141,7 @@ class Summarizer {
     summary_.steps.captured += origin.captured;
     summary_.steps.mirrored += origin.mirrored;
     summary_.steps.generated += origin.generated;
+    summary_.steps.completed += origin.completed;
     ++summary_.feet[static_cast<std::size_t>(foot)];
     const bool starts_together = std::fabs(step.start_m.z) <= LibrarySummary::kTogetherM;
     const bool ends_together = std::fabs(step.end_m.z) <= LibrarySummary::kTogetherM;
@@ -261,6 +266,7 @@ std::string OriginText(const ExampleOrigins& origins) {
   add(origins.captured, "captured");
   add(origins.mirrored, "mirrored");
   add(origins.generated, "generated");
+  add(origins.completed, "completed");
   return text;
 }
 

@@ -14,8 +14,9 @@ struct ExampleOrigins {
   int captured = 0;   ///< Cut from a capture.
   int mirrored = 0;   ///< Mirror image of a captured example.
   int generated = 0;  ///< Generated without a capture.
+  int completed = 0;  ///< Generated because the captures lack such a movement.
 
-  [[nodiscard]] int total() const { return captured + mirrored + generated; }
+  [[nodiscard]] int total() const { return captured + mirrored + generated + completed; }
 };
 
 /// Smallest and largest value; 0 if there is none.

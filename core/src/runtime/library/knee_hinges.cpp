@@ -54,13 +54,12 @@ DVec3 PlaneNormal(const Skeleton& skeleton, const LegChain& chain, const Rotatio
 DVec3 Unit(const DVec3& v) { return v / std::sqrt(glm::dot(v, v)); }
 
 // Returns the axis that points to the left of the foot in the stand pose.
-DVec3 HingeOfStand(const MotionLibrary& library, Foot foot) {
-  const Skeleton& skeleton = library.skeleton();
+DVec3 HingeOfStand(const Skeleton& skeleton, ConstPoseSpan stand_pose, Foot foot) {
   const Leg& leg = skeleton.leg(foot);
   std::vector<Vec3> positions(skeleton.joints.size());
   std::vector<Quat> rotations(skeleton.joints.size());
-  ForwardKinematics(skeleton, library.stand_pose(), positions, rotations);
-  const Vec3 sole = PointPosition(skeleton, library.stand_pose(), leg.ball, leg.toe_tip_offset_m) -
+  ForwardKinematics(skeleton, stand_pose, positions, rotations);
+  const Vec3 sole = PointPosition(skeleton, stand_pose, leg.ball, leg.toe_tip_offset_m) -
                     positions[static_cast<std::size_t>(leg.ankle)];
   // The stand pose faces +Z.
   const bool has_direction = std::sqrt(sole.x * sole.x + sole.z * sole.z) >= kSmallestBoneM;
@@ -69,29 +68,68 @@ DVec3 HingeOfStand(const MotionLibrary& library, Foot foot) {
   return glm::conjugate(DQuat(rotations[static_cast<std::size_t>(leg.hip)])) * Unit(left);
 }
 
+// Learns the hinge of one knee from poses.
+class HingeLearner {
+ public:
+  HingeLearner(const Skeleton& skeleton, Foot foot)
+      : skeleton_(skeleton), foot_(foot), chain_(ChainOf(skeleton, skeleton.leg(foot))) {}
+
+  [[nodiscard]] bool has_leg() const { return !chain_.joints.empty(); }
+
+  // Adds a pose. `rotation_of(j)` returns the local rotation of a joint.
+  template <typename RotationOf>
+  void Add(const RotationOf& rotation_of) {
+    const DVec3 normal = PlaneNormal(skeleton_, chain_, rotation_of);
+    sum_ += std::sqrt(glm::dot(normal, normal)) * normal;
+    count_ += 1.0;
+  }
+
+  [[nodiscard]] Vec3 Hinge(ConstPoseSpan stand_pose) const {
+    const double mean_square_sine = std::sqrt(glm::dot(sum_, sum_)) / std::max(count_, 1.0);
+    const bool bends = mean_square_sine >= static_cast<double>(kBentSine) * kBentSine;
+    return Vec3(bends ? Unit(sum_) : HingeOfStand(skeleton_, stand_pose, foot_));
+  }
+
+ private:
+  const Skeleton& skeleton_;
+  Foot foot_;
+  LegChain chain_;
+  DVec3 sum_ = DVec3(0.0);
+  double count_ = 0.0;
+};
+
 }  // namespace
 
 std::array<Vec3, 2> LearnKneeHinges(const MotionLibrary& library) {
-  const Skeleton& skeleton = library.skeleton();
   const auto row_floats = static_cast<std::size_t>(library.layout().row_floats);
   std::array<Vec3, 2> hinges{Vec3(0.0f), Vec3(0.0f)};
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    const LegChain chain = ChainOf(skeleton, skeleton.leg(foot));
-    if (chain.joints.empty()) continue;
-    DVec3 sum(0.0);
-    double row_count = 0.0;
+    HingeLearner learner(library.skeleton(), foot);
+    if (!learner.has_leg()) continue;
     for (const MotionGroup& group : library.groups()) {
       for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
-        const DVec3 normal = PlaneNormal(skeleton, chain, [&](std::size_t joint) {
-          return GridLayout::RotationOf(&group.grid[row], joint);
-        });
-        sum += std::sqrt(glm::dot(normal, normal)) * normal;
-        row_count += 1.0;
+        learner.Add(
+            [&](std::size_t joint) { return GridLayout::RotationOf(&group.grid[row], joint); });
       }
     }
-    const double mean_square_sine = std::sqrt(glm::dot(sum, sum)) / std::max(row_count, 1.0);
-    const bool bends = mean_square_sine >= static_cast<double>(kBentSine) * kBentSine;
-    hinges[static_cast<std::size_t>(foot)] = Vec3(bends ? Unit(sum) : HingeOfStand(library, foot));
+    hinges[static_cast<std::size_t>(foot)] = learner.Hinge(library.stand_pose());
+  }
+  return hinges;
+}
+
+std::array<Vec3, 2> LearnKneeHinges(const Skeleton& skeleton, ConstPoseSpan stand_pose,
+                                    std::span<const Clip* const> clips) {
+  std::array<Vec3, 2> hinges{Vec3(0.0f), Vec3(0.0f)};
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    HingeLearner learner(skeleton, foot);
+    if (!learner.has_leg()) continue;
+    for (const Clip* clip : clips) {
+      for (int f = 0; f < clip->frame_count(); ++f) {
+        const ConstPoseSpan pose = clip->frame(f);
+        learner.Add([&](std::size_t joint) { return pose.rotations[joint]; });
+      }
+    }
+    hinges[static_cast<std::size_t>(foot)] = learner.Hinge(stand_pose);
   }
   return hinges;
 }

@@ -1,8 +1,12 @@
 #pragma once
 
 #include <array>
+#include <span>
 
 #include "stridewire/base/math.h"
+#include "stridewire/runtime/clip.h"
+#include "stridewire/runtime/pose.h"
+#include "stridewire/runtime/skeleton.h"
 
 namespace stridewire {
 
@@ -19,5 +23,10 @@ class MotionLibrary;
 /// Requires a library whose groups and stand pose are loaded. Returns zero vectors for a leg that
 /// is not a chain of hip, knee and ankle.
 [[nodiscard]] std::array<Vec3, 2> LearnKneeHinges(const MotionLibrary& library);
+
+/// The same for the frames of clips, before there is a library.
+[[nodiscard]] std::array<Vec3, 2> LearnKneeHinges(const Skeleton& skeleton,
+                                                  ConstPoseSpan stand_pose,
+                                                  std::span<const Clip* const> clips);
 
 }  // namespace stridewire

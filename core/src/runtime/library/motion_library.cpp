@@ -327,6 +327,8 @@ Expected<MotionGroup> LoadGroup(const fb::Group& from, const GridLayout& layout,
   for (const flatbuffers::String* source : *from.sources()) {
     group.sources.push_back(source->string_view());
   }
+  group.is_completed = std::ranges::all_of(
+      group.sources, [](std::string_view source) { return source.starts_with(kCompletedSource); });
   group.mirrored = ToSpan(from.mirrored());
   return group;
 }

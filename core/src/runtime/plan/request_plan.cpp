@@ -28,6 +28,9 @@ constexpr double kFootPreferenceM = 0.01;
 // Extra cost of a group with turn, side or height parameters for a step that requests none of them.
 // Such parameters take arbitrary values and would bend a straight walk.
 constexpr double kStraightPreferenceM = 0.15;
+// Extra cost of a group whose steps were generated because the captures lack them. Captured steps
+// are preferred if they fit nearly as well.
+constexpr double kCompletedCostM = 0.02;
 // Extra cost per metre outside the hull of the examples, even where requests may extrapolate.
 constexpr double kOutsideWeight = 0.25;
 // Tolerances for the start of a step in groups without a start parameter for side or height. Such a
@@ -177,6 +180,7 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
     if (group.kind != kind) continue;
     double group_cost_m = kCostPerParameterM * group.parameter_count();
     if (is_straight && IsGeneral(group)) group_cost_m += kStraightPreferenceM;
+    if (group.is_completed) group_cost_m += kCompletedCostM;
     const auto plan =
         PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m, best_cost_m);
     if (!plan) continue;

@@ -46,6 +46,10 @@ constexpr Term kTerms[] = {
      "different examples coincide."},
     {"Captured, mirrored, generated",
      "Where an example comes from: a recording, the mirror image of a recording, or formulas."},
+    {"Completed",
+     "Origin of an example that was generated in the posture and cadence of the recordings, "
+     "because "
+     "they lack such a movement."},
     {"Stand pose", "The pose in which an avatar stands."},
 };
 

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "offline/complete/posture_mix.h"
+#include "offline/complete/stride_model.h"
+#include "runtime/skeleton/leg_rig.h"
+
+namespace stridewire::complete {
+
+/// Returns a stride for a person whose captures contain none: that of the generated figure of the
+/// library `builtin`, in the proportions of the person. Pelvis and feet deviate from the stand pose
+/// of the person as those of the generated figure deviate from its own. The trunk stays as in the
+/// stand, and the arms swing a little.
+[[nodiscard]] StrideModel GenericStride(const Skeleton& skeleton, const LegRig& rig,
+                                        const PostureSample& stand, Foot moving);
+
+}  // namespace stridewire::complete

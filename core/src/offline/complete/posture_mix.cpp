@@ -1,0 +1,57 @@
+#include "offline/complete/posture_mix.h"
+
+#include <cmath>
+
+namespace stridewire::complete {
+
+DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b) {
+  const double sign = glm::dot(a, b) < 0.0 ? -1.0 : 1.0;
+  const DQuat sum = a * (1.0 - share_of_b) + b * (sign * share_of_b);
+  const double length = std::sqrt(glm::dot(sum, sum));
+  return length > 1e-9 ? sum * (1.0 / length) : a;
+}
+
+PostureSample Blend(const PostureSample& a, const PostureSample& b, double share_of_b) {
+  PostureSample out;
+  const auto mix = [&](const DVec3& u, const DVec3& v) { return u + share_of_b * (v - u); };
+  out.root_m = mix(a.root_m, b.root_m);
+  out.rotations.resize(a.rotations.size());
+  for (std::size_t j = 0; j < a.rotations.size(); ++j) {
+    out.rotations[j] = Blend(a.rotations[j], b.rotations[j], share_of_b);
+  }
+  for (std::size_t f = 0; f < 2; ++f) {
+    out.ankles[f] = Blend(a.ankles[f], b.ankles[f], share_of_b);
+    out.balls_m[f] = mix(a.balls_m[f], b.balls_m[f]);
+  }
+  return out;
+}
+
+PostureSample SampleOf(const Skeleton& skeleton, ConstPoseSpan pose, double heading_rad) {
+  const std::size_t joints = skeleton.joints.size();
+  std::vector<Vec3> positions(joints);
+  std::vector<Quat> world(joints);
+  ForwardKinematics(skeleton, pose, positions, world);
+  const DQuat to_heading(YawRotation(-heading_rad));
+  PostureSample sample;
+  sample.root_m = RotateYaw(-heading_rad, DVec3(pose.root_position_m));
+  for (const Quat& rotation : pose.rotations) sample.rotations.emplace_back(rotation);
+  sample.rotations[0] = to_heading * sample.rotations[0];
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const auto f = static_cast<std::size_t>(foot);
+    const auto ankle = static_cast<std::size_t>(skeleton.leg(foot).ankle);
+    sample.ankles[f] = to_heading * DQuat(world[ankle]);
+    sample.balls_m[f] = RotateYaw(-heading_rad, DVec3(BallPosition(skeleton, pose, foot)));
+  }
+  return sample;
+}
+
+Pose ToPose(const PostureSample& sample) {
+  Pose pose(static_cast<int>(sample.rotations.size()));
+  pose.root_position_m = Vec3(sample.root_m);
+  for (std::size_t j = 0; j < sample.rotations.size(); ++j) {
+    pose.rotations[j] = Normalise(Quat(sample.rotations[j]));
+  }
+  return pose;
+}
+
+}  // namespace stridewire::complete

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "stridewire/base/math.h"
+#include "stridewire/runtime/pose.h"
+#include "stridewire/runtime/skeleton.h"
+
+namespace stridewire::complete {
+
+/// Returns the sign of x on the outer side of a foot: +1 for the left, -1 for the right foot.
+[[nodiscard]] constexpr double Outward(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
+
+/// A pose in double precision, together with the feet that it is to have. Rotations of the world
+/// are relative to the heading.
+struct PostureSample {
+  DVec3 root_m = DVec3(0.0);
+  /// [joint]: rotation relative to the parent; that of the root is relative to the heading.
+  std::vector<DQuat> rotations;
+  std::array<DQuat, 2> ankles;                           ///< [Foot]: world rotation of the ankle.
+  std::array<DVec3, 2> balls_m{DVec3(0.0), DVec3(0.0)};  ///< [Foot]: position of the ball.
+};
+
+/// Returns the normalised linear blend of two rotations along the short arc. It uses only square
+/// roots and divisions, so that the result has the same bits on every machine. It commutes with
+/// constant rotations on both sides, so that it does not depend on the axes of joints.
+[[nodiscard]] DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b);
+
+/// Returns a + share (b - a) of every part of two samples.
+[[nodiscard]] PostureSample Blend(const PostureSample& a, const PostureSample& b,
+                                  double share_of_b);
+
+/// Measures the feet of a pose. `pose` has the heading `heading_rad`.
+[[nodiscard]] PostureSample SampleOf(const Skeleton& skeleton, ConstPoseSpan pose,
+                                     double heading_rad);
+
+/// Converts to a pose in single precision.
+[[nodiscard]] Pose ToPose(const PostureSample& sample);
+
+}  // namespace stridewire::complete

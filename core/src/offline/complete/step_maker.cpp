@@ -1,0 +1,509 @@
+#include "offline/complete/step_maker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/check.h"
+#include "base/trig.h"
+#include "offline/builtin/elementary.h"
+#include "runtime/skeleton/foot_vector.h"
+
+namespace stridewire::complete {
+namespace {
+
+using builtin::Ease;
+
+constexpr double kFps = 120.0;
+
+// Timing of steps from and to a stand, where the weight has to move without momentum.
+constexpr double kWeightShiftS = 0.28;
+constexpr double kSettleS = 0.24;
+// The same for steps that begin and end in a stand, as in turns on the spot.
+constexpr double kWeightShiftInPlaceS = 0.18;
+constexpr double kSettleInPlaceS = 0.15;
+constexpr double kMinSwingS = 0.36;
+constexpr double kMaxSwingS = 0.62;
+// Steps backward take longer than the same steps forward.
+constexpr double kBackwardSlower = 1.15;
+
+// The foot leaves its place a little before the toe-off that was detected in the captures, and
+// rests a little after the heel-strike.
+constexpr double kSwingBegin = 0.92;
+constexpr double kSwingEnd = 2.06;
+// Least share of the captured swing in the pitch and the height of the swinging foot.
+constexpr double kMinSwingShare = 0.45;
+constexpr double kClearanceM = 0.02;
+constexpr double kTipClearanceM = 0.014;
+constexpr double kLiftStepM = 0.004;
+constexpr double kMaxLiftM = 0.12;
+constexpr double kFootWidthM = 0.09;  // Least distance between feet that pass each other.
+constexpr double kBowStepM = 0.01;
+constexpr double kMaxBowM = 0.35;
+
+// Shift of the weight over the fixed foot in steps from and to a stand, as a share of the distance
+// to that foot.
+constexpr double kSwayShare = 0.45;
+// The share of a stride in a state is limited, because more than a full stride is extrapolated.
+constexpr double kMaxShare = 1.15;
+// Legs are at most this straight, unless the stand pose is straighter.
+constexpr double kMaxExtension = 0.996;
+constexpr int kReachHalf = 10;  // Half width of the filters that lower the root, in samples.
+
+std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
+
+// Quintic from 0 to 1 with zero velocity and acceleration at both ends.
+double Smooth(double x) {
+  const double s = std::clamp(x, 0.0, 1.0);
+  return s * s * s * (10.0 + s * (6.0 * s - 15.0));
+}
+
+// A bump of height 1 with zero velocity at both ends of [0, 1].
+double Bump(double x) {
+  const double s = std::clamp(x, 0.0, 1.0);
+  return 16.0 * s * s * (1.0 - s) * (1.0 - s);
+}
+
+// A cubic curve between two positions and velocities.
+struct Cubic {
+  DVec3 from = DVec3(0.0);
+  DVec3 from_velocity = DVec3(0.0);
+  DVec3 to = DVec3(0.0);
+  DVec3 to_velocity = DVec3(0.0);
+  double duration_s = 1.0;
+
+  [[nodiscard]] DVec3 At(double time_s) const {
+    const double u = std::clamp(time_s / duration_s, 0.0, 1.0);
+    const double u2 = u * u;
+    const double u3 = u2 * u;
+    return (2.0 * u3 - 3.0 * u2 + 1.0) * from +
+           duration_s * ((u3 - 2.0 * u2 + u) * from_velocity + (u3 - u2) * to_velocity) +
+           (3.0 * u2 - 2.0 * u3) * to;
+  }
+};
+
+class StepGenerator {
+ public:
+  StepGenerator(const Person& person, Foot moving, const StepFeet& feet)
+      : person_(person),
+        stride_(person.strides[Index(moving)]),
+        moving_(moving),
+        fixed_(OtherFoot(moving)),
+        feet_(feet) {
+    const double stand_z = person.StandVector(moving).z;
+    start_share_ = Share((stand_z - feet.start_m.z) / (stand_z + stride_.start_length_m));
+    end_share_ = Share((feet.end_m.z - stand_z) / (stride_.end_length_m - stand_z));
+    SetTiming();
+    PlanRoot();
+    PlanSwing();
+  }
+
+  RawExample Run(std::span<const ParameterName> names, std::string source) {
+    const int frames = static_cast<int>(std::floor(end_s_ * kFps + 0.5)) + 1;
+    RawExample example;
+    example.keytimes_s = {0.0, toe_off_s_, strike_s_, end_s_};
+    example.heading_change_rad = feet_.turn_rad;
+    example.source = std::move(source);
+    example.clip.fps = kFps;
+    example.clip.Resize(frames, person_.skeleton.joint_count());
+    const std::vector<double> lowered_m = Lowering(frames);
+    const DVec3 origin = RootAt(0.0);
+    for (int f = 0; f < frames; ++f) {
+      Pose pose = PoseAt(f / kFps, lowered_m[static_cast<std::size_t>(f)]);
+      pose.root_position_m -=
+          Vec3(static_cast<float>(origin.x), 0.0f, static_cast<float>(origin.z));
+      PoseSpan out = example.clip.frame(f);
+      out.root_position_m = pose.root_position_m;
+      std::ranges::copy(pose.rotations, out.rotations.begin());
+    }
+    MakeSignContinuous(example.clip);
+    SetParameters(names, example);
+    return example;
+  }
+
+  void SetParameters(std::span<const ParameterName> names, RawExample& example) const {
+    const Clip& clip = example.clip;
+    const DVec3 start = FootVector(person_.skeleton, clip.frame(0), moving_, 0.0);
+    const DVec3 end = FootVector(person_.skeleton, clip.frame(clip.frame_count() - 1), moving_,
+                                 example.heading_change_rad);
+    example.parameters.clear();
+    for (const ParameterName name : names) {
+      switch (name) {
+        case ParameterName::kStartX: example.parameters.push_back(start.x); break;
+        case ParameterName::kStartY: example.parameters.push_back(start.y); break;
+        case ParameterName::kStartZ: example.parameters.push_back(start.z); break;
+        case ParameterName::kEndX: example.parameters.push_back(end.x); break;
+        case ParameterName::kEndY: example.parameters.push_back(end.y); break;
+        case ParameterName::kEndZ: example.parameters.push_back(end.z); break;
+        case ParameterName::kTurn: example.parameters.push_back(example.heading_change_rad); break;
+        case ParameterName::kLength:
+        case ParameterName::kHeight: STRIDEWIRE_CHECK(false); break;
+      }
+    }
+  }
+
+ private:
+  static double Share(double share) { return std::clamp(share, 0.0, kMaxShare); }
+  static double ToFrames(double time_s) { return std::floor(time_s * kFps + 0.5) / kFps; }
+
+  void SetTiming() {
+    const auto& keys = stride_.keytimes_s;
+    const auto mix = [](double stand, double stride, double share) {
+      return stand + std::min(1.0, 2.0 * share) * (stride - stand);
+    };
+    const double in_place = 1.0 - std::min(1.0, 2.0 * std::max(start_share_, end_share_));
+    const double shift_s = kWeightShiftS + in_place * (kWeightShiftInPlaceS - kWeightShiftS);
+    const double settle_s = kSettleS + in_place * (kSettleInPlaceS - kSettleS);
+    toe_off_s_ = ToFrames(mix(shift_s, keys[1], start_share_));
+    const double swing_s = std::clamp(keys[2] - keys[1], kMinSwingS, kMaxSwingS);
+    strike_s_ = toe_off_s_ + ToFrames(swing_s);
+    end_s_ = strike_s_ + ToFrames(mix(settle_s, keys[3] - keys[2], end_share_));
+  }
+
+  [[nodiscard]] double GenericAt(double time_s) const {
+    if (time_s <= toe_off_s_) return time_s / toe_off_s_;
+    if (time_s <= strike_s_) return 1.0 + (time_s - toe_off_s_) / (strike_s_ - toe_off_s_);
+    return 2.0 + std::min(1.0, (time_s - strike_s_) / (end_s_ - strike_s_));
+  }
+  // Returns the time of a generic time of the captured stride.
+  [[nodiscard]] double CapturedTimeAt(double generic) const {
+    const auto i = static_cast<std::size_t>(std::min(2.0, std::floor(generic)));
+    const auto& keys = stride_.keytimes_s;
+    return keys[i] + (generic - static_cast<double>(i)) * (keys[i + 1] - keys[i]);
+  }
+  [[nodiscard]] double ShareAt(double time_s) const {
+    return start_share_ + (end_share_ - start_share_) * Smooth(time_s / end_s_);
+  }
+  [[nodiscard]] double HeadingAt(double time_s) const {
+    return feet_.turn_rad * Smooth(time_s / end_s_);
+  }
+  // Progress of the swing, 0 to 1.
+  static double SwingAt(double generic) {
+    return std::clamp((generic - kSwingBegin) / (kSwingEnd - kSwingBegin), 0.0, 1.0);
+  }
+  // Share of the captured stride in the swinging foot.
+  [[nodiscard]] double SwingShareAt(double time_s) const {
+    const double share = ShareAt(time_s);
+    return share + std::max(0.0, kMinSwingShare - share) * Bump(SwingAt(GenericAt(time_s)));
+  }
+
+  // Returns the root relative to the middle between the balls of a sample.
+  static DVec3 RootFromFeet(const PostureSample& sample) {
+    DVec3 middle = 0.5 * (sample.balls_m[0] + sample.balls_m[1]);
+    middle.y = 0.0;
+    return sample.root_m - middle;
+  }
+
+  void PlanRoot() {
+    const PostureSample& first = stride_.points.front();
+    const PostureSample& last = stride_.points.back();
+    captured_ = {first.root_m, stride_.StartVelocity(), last.root_m, stride_.EndVelocity(),
+                 stride_.keytimes_s[3]};
+    const auto state = [&](const PostureSample& stride, const DVec3& feet_m, double share) {
+      const DVec3 from_feet = RootFromFeet(person_.stand) +
+                              share * (RootFromFeet(stride) - RootFromFeet(person_.stand));
+      return 0.5 * DVec3(feet_m.x, 0.0, feet_m.z) + from_feet;
+    };
+    root_.from = state(first, feet_.start_m, start_share_);
+    root_.to = RotateYaw(feet_.turn_rad, state(last, feet_.end_m, end_share_));
+    root_.from_velocity = start_share_ * captured_.from_velocity;
+    root_.to_velocity = RotateYaw(feet_.turn_rad, end_share_ * captured_.to_velocity);
+    // A cubic curve would overshoot if it had to cover a short distance from a high speed.
+    const auto limit = [&](DVec3& velocity) {
+      const DVec3 way = root_.to - root_.from;
+      const double most = 3.0 * std::hypot(way.x, way.z) / end_s_;
+      const double speed = std::hypot(velocity.x, velocity.z);
+      if (speed > most && speed > 0.0) velocity *= most / speed;
+    };
+    limit(root_.from_velocity);
+    limit(root_.to_velocity);
+    root_.duration_s = end_s_;
+  }
+
+  // Returns the root before it is lowered into the reach of the legs.
+  [[nodiscard]] DVec3 RootAt(double time_s) const {
+    const double generic = GenericAt(time_s);
+    const double share = std::min(1.0, ShareAt(time_s));
+    const DVec3 deviation = stride_.At(generic).root_m - captured_.At(CapturedTimeAt(generic));
+    const double heading = HeadingAt(time_s);
+    // The fixed ball is the origin. Momentum replaces a part of the shift of the weight.
+    const double to_fixed_m = -0.5 * (feet_.start_m.x + feet_.end_m.x) * 0.5;
+    const DVec3 sway(kSwayShare * (1.0 - share) * to_fixed_m * Bump(time_s / end_s_), 0.0, 0.0);
+    return root_.At(time_s) + RotateYaw(heading, share * deviation + sway);
+  }
+
+  [[nodiscard]] DVec3 BallAt(Foot foot, double time_s) const {
+    const double generic = GenericAt(time_s);
+    const auto f = Index(foot);
+    const double share = foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s);
+    const double stand_y = person_.stand.balls_m[f].y;
+    DVec3 ball(0.0, stand_y + share * (stride_.At(generic).balls_m[f].y - stand_y), 0.0);
+    if (foot == fixed_) return ball;
+    const double swing = SwingAt(generic);
+    const DVec3 end = RotateYaw(feet_.turn_rad, feet_.end_m);
+    const DVec3 place = feet_.start_m + Smooth(swing) * (end - feet_.start_m);
+    const DVec3 outward = RotateYaw(0.5 * feet_.turn_rad, DVec3(Outward(moving_), 0.0, 0.0));
+    ball.x = place.x + bow_m_ * Bump(swing) * outward.x;
+    ball.z = place.z + bow_m_ * Bump(swing) * outward.z;
+    ball.y += lift_m_ * Bump(swing);
+    return ball;
+  }
+
+  // Yaw of a foot relative to the heading at the start of the step.
+  [[nodiscard]] double FootYawAt(Foot foot, double time_s) const {
+    if (foot == fixed_) return 0.0;
+    return feet_.turn_rad * Smooth((SwingAt(GenericAt(time_s)) - 0.08) / 0.84);
+  }
+  [[nodiscard]] DQuat AnkleRotationAt(Foot foot, double time_s) const {
+    const double share = foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s);
+    const auto f = Index(foot);
+    return DQuat(YawRotation(FootYawAt(foot, time_s))) *
+           Blend(person_.stand.ankles[f], stride_.At(GenericAt(time_s)).ankles[f],
+                 std::min(1.0, share));
+  }
+
+  // Rotations of all joints before inverse kinematics, with the root at the origin.
+  [[nodiscard]] Pose PostureAt(double time_s) const {
+    const double share = std::min(1.0, ShareAt(time_s));
+    const PostureSample stride = stride_.At(GenericAt(time_s));
+    PostureSample sample = Blend(person_.stand, stride, share);
+    // The legs get more of the captured swing, so that they bend in the plane of the capture.
+    const double leg_share = std::min(1.0, SwingShareAt(time_s));
+    for (const int joint : person_.rig.side(moving_).chain) {
+      const auto j = static_cast<std::size_t>(joint);
+      if (j == 0) continue;
+      sample.rotations[j] = Blend(person_.stand.rotations[j], stride.rotations[j], leg_share);
+    }
+    const double heading = HeadingAt(time_s);
+    const DQuat root = DQuat(YawRotation(heading)) * sample.rotations[0];
+    sample.rotations[0] = root;
+    // While a foot is turned relative to the body, the leg turns half as far.
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const double half = 0.5 * (FootYawAt(foot, time_s) - heading);
+      const auto& side = person_.rig.side(foot);
+      const auto hip = static_cast<std::size_t>(side.chain[static_cast<std::size_t>(side.hip)]);
+      DQuat above(1.0, 0.0, 0.0, 0.0);
+      for (int i = 0; i < side.hip; ++i) {
+        above = above *
+                sample.rotations[static_cast<std::size_t>(side.chain[static_cast<std::size_t>(i)])];
+      }
+      sample.rotations[hip] =
+          glm::conjugate(above) * DQuat(YawRotation(half)) * above * sample.rotations[hip];
+    }
+    sample.root_m = DVec3(0.0);
+    return ToPose(sample);
+  }
+
+  struct LegTarget {
+    LegPose leg;
+    DVec3 ankle_m = DVec3(0.0);  // Relative to the fixed ball.
+    DQuat rotation;
+    DVec3 tip_m = DVec3(0.0);
+    DVec3 heel_m = DVec3(0.0);
+  };
+
+  [[nodiscard]] LegTarget TargetAt(Foot foot, double time_s, const Pose& posture) const {
+    LegTarget target;
+    const LegRig::Side& side = person_.rig.side(foot);
+    EvaluateLeg(person_.skeleton, person_.rig, posture, foot, target.leg);
+    target.rotation = AnkleRotationAt(foot, time_s);
+    const auto ankle = static_cast<std::size_t>(side.ankle);
+    const auto turned = [&](const Vec3& point) {
+      return target.rotation * (glm::conjugate(DQuat(target.leg.world_rotations[ankle])) *
+                                DVec3(point - target.leg.positions_m[ankle]));
+    };
+    target.ankle_m = BallAt(foot, time_s) - turned(target.leg.ball_m);
+    target.tip_m = target.ankle_m + turned(target.leg.toe_tip_m);
+    target.heel_m = target.ankle_m + target.rotation * DVec3(side.heel_m);
+    return target;
+  }
+
+  // Distance of the swinging foot from the fixed one, seen from above, between heel and toe tip.
+  [[nodiscard]] double FeetApart(double time_s) const {
+    const Pose posture = PostureAt(time_s);
+    const LegTarget swinging = TargetAt(moving_, time_s, posture);
+    const LegTarget still = TargetAt(fixed_, time_s, posture);
+    double nearest = kMaxBowM;
+    for (int i = 0; i <= 4; ++i) {
+      for (int k = 0; k <= 4; ++k) {
+        const DVec3 a = swinging.heel_m + 0.25 * i * (swinging.tip_m - swinging.heel_m);
+        const DVec3 b = still.heel_m + 0.25 * k * (still.tip_m - still.heel_m);
+        nearest = std::min(nearest, std::hypot(a.x - b.x, a.z - b.z));
+      }
+    }
+    return nearest;
+  }
+
+  [[nodiscard]] double SwingTime(double part) const {
+    return toe_off_s_ + part * (strike_s_ - toe_off_s_);
+  }
+
+  [[nodiscard]] double NearestApproach() const {
+    double nearest = kMaxBowM;
+    for (int i = 1; i < 10; ++i) nearest = std::min(nearest, FeetApart(SwingTime(0.1 * i)));
+    return nearest;
+  }
+
+  // Leads the swinging foot around the fixed one if the step turns, and raises it until it is clear
+  // of the ground.
+  void PlanSwing() {
+    if (feet_.turn_rad != 0.0) {
+      double best_m = 0.0;
+      double widest_m = 0.0;
+      for (bow_m_ = 0.0; bow_m_ < kMaxBowM; bow_m_ += kBowStepM) {
+        const double nearest_m = NearestApproach();
+        if (nearest_m <= widest_m + 1e-3) continue;
+        widest_m = nearest_m;
+        best_m = bow_m_;
+        if (widest_m >= kFootWidthM) break;
+      }
+      bow_m_ = best_m;
+    }
+    const LegRig::Side& side = person_.rig.side(moving_);
+    const double ball_y = person_.stand.balls_m[Index(moving_)].y;
+    const auto is_clear = [&] {
+      for (int i = 4; i <= 17; ++i) {
+        const double part = 0.05 * i;
+        const double time_s = SwingTime(part);
+        const LegTarget target = TargetAt(moving_, time_s, PostureAt(time_s));
+        if (BallAt(moving_, time_s).y < ball_y + (part < 0.3 ? 0.0 : kClearanceM)) return false;
+        if (target.tip_m.y < side.toe_height_m + (part < 0.3 ? 0.0 : kTipClearanceM)) return false;
+      }
+      return true;
+    };
+    while (!is_clear() && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
+  }
+
+  // Distance by which the root has to be lowered, so that the legs reach the feet.
+  [[nodiscard]] double Excess(double time_s) const {
+    const Pose posture = PostureAt(time_s);
+    const DVec3 root = RootAt(time_s);
+    double excess = -HUGE_VAL;
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const LegTarget target = TargetAt(foot, time_s, posture);
+      const LegRig::Side& side = person_.rig.side(foot);
+      const DVec3 hip = root + DVec3(target.leg.positions_m[static_cast<std::size_t>(side.hip)]);
+      const double reach = ExtensionOf(foot) * (side.thigh_m + side.shank_m);
+      const double dx = hip.x - target.ankle_m.x;
+      const double dz = hip.z - target.ankle_m.z;
+      const double ceiling =
+          target.ankle_m.y + std::sqrt(std::max(0.0, reach * reach - dx * dx - dz * dz));
+      excess = std::max(excess, hip.y - ceiling);
+    }
+    return std::max(0.0, excess);
+  }
+
+  [[nodiscard]] double ExtensionOf(Foot foot) const {
+    LegPose leg;
+    EvaluateLeg(person_.skeleton, person_.rig, ToPose(person_.stand), foot, leg);
+    const LegRig::Side& side = person_.rig.side(foot);
+    const Vec3 reach = leg.positions_m[static_cast<std::size_t>(side.ankle)] -
+                       leg.positions_m[static_cast<std::size_t>(side.hip)];
+    const double standing = glm::length(reach) / (side.thigh_m + side.shank_m);
+    return std::max(kMaxExtension, standing);
+  }
+
+  // Returns how far the root is lowered at each frame: smoothly, and at both ends exactly as far as
+  // the state requires.
+  [[nodiscard]] std::vector<double> Lowering(int frames) const {
+    const auto count = static_cast<std::size_t>(frames);
+    std::vector<double> lowered(count, 0.0);
+    const double first = Excess(0.0);
+    const double last = Excess(end_s_);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double part = static_cast<double>(i) / static_cast<double>(count - 1);
+      lowered[i] = first + (last - first) * Smooth(part);
+    }
+    std::vector<double> highest(count);
+    for (int round = 0; round < 3; ++round) {
+      std::vector<double> excess(count);
+      for (std::size_t i = 0; i < count; ++i) {
+        excess[i] = std::max(0.0, Excess(static_cast<double>(i) / kFps) - lowered[i]);
+      }
+      const auto at = [&](const std::vector<double>& values, int i) {
+        return values[static_cast<std::size_t>(std::clamp(i, 0, frames - 1))];
+      };
+      for (int i = 0; i < frames; ++i) {
+        double most = 0.0;
+        for (int k = -kReachHalf; k <= kReachHalf; ++k) most = std::max(most, at(excess, i + k));
+        highest[static_cast<std::size_t>(i)] = most;
+      }
+      for (int i = 0; i < frames; ++i) {
+        double sum = 0.0;
+        double weights = 0.0;
+        for (int k = -kReachHalf; k <= kReachHalf; ++k) {
+          const double weight = 1.0 - std::fabs(k) / (kReachHalf + 1.0);
+          sum += weight * at(highest, i + k);
+          weights += weight;
+        }
+        const double to_end = std::min(i, frames - 1 - i);
+        lowered[static_cast<std::size_t>(i)] += sum / weights * Ease(to_end / 8.0);
+      }
+    }
+    return lowered;
+  }
+
+  [[nodiscard]] Pose PoseAt(double time_s, double lowered_m) const {
+    Pose pose = PostureAt(time_s);
+    DVec3 root = RootAt(time_s);
+    root.y -= lowered_m;
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const LegTarget target = TargetAt(foot, time_s, pose);
+      SolveLeg(person_.rig, foot, target.leg, Vec3(target.ankle_m - root), Quat(target.rotation),
+               pose);
+    }
+    pose.root_position_m = Vec3(root);
+    return pose;
+  }
+
+  const Person& person_;
+  const StrideModel& stride_;
+  Foot moving_;
+  Foot fixed_;
+  StepFeet feet_;
+  double start_share_ = 0.0;
+  double end_share_ = 0.0;
+  double toe_off_s_ = 0.0;
+  double strike_s_ = 0.0;
+  double end_s_ = 0.0;
+  Cubic captured_;
+  Cubic root_;
+  double bow_m_ = 0.0;
+  double lift_m_ = 0.0;
+};
+
+}  // namespace
+
+DVec3 Person::StandVector(Foot moving) const {
+  return stand.balls_m[Index(moving)] - stand.balls_m[Index(OtherFoot(moving))];
+}
+
+RawExample MakeStep(const Person& person, Foot moving, const StepFeet& feet,
+                    std::span<const ParameterName> names, std::string source) {
+  return StepGenerator(person, moving, feet).Run(names, std::move(source));
+}
+
+RawExample MakeBackwardStep(const Person& person, Foot moving, const StepFeet& feet,
+                            std::span<const ParameterName> names, std::string source) {
+  StepGenerator generator(person, moving, {feet.end_m, feet.start_m, 0.0});
+  const RawExample forward = generator.Run(names, std::move(source));
+  RawExample backward = forward;
+  const double end_s = kBackwardSlower * forward.keytimes_s.back();
+  const std::size_t keys = forward.keytimes_s.size();
+  for (std::size_t k = 0; k < keys; ++k) {
+    backward.keytimes_s[k] = end_s - kBackwardSlower * forward.keytimes_s[keys - 1 - k];
+  }
+  backward.clip.fps = forward.clip.fps / kBackwardSlower;
+  const int last = forward.clip.frame_count() - 1;
+  const Vec3 start = forward.clip.frame(last).root_position_m;
+  for (int f = 0; f <= last; ++f) {
+    const ConstPoseSpan from = forward.clip.frame(last - f);
+    PoseSpan to = backward.clip.frame(f);
+    to.root_position_m = from.root_position_m - Vec3(start.x, 0.0f, start.z);
+    std::ranges::copy(from.rotations, to.rotations.begin());
+  }
+  generator.SetParameters(names, backward);
+  return backward;
+}
+
+}  // namespace stridewire::complete

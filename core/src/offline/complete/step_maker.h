@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "offline/complete/posture_mix.h"
+#include "offline/complete/stride_model.h"
+#include "runtime/skeleton/leg_rig.h"
+#include "stridewire/offline/raw_library.h"
+
+namespace stridewire::complete {
+
+/// The person for whom steps are generated.
+struct Person {
+  const Skeleton& skeleton;
+  LegRig rig;
+  PostureSample stand;                 ///< The stand pose; its heading is 0.
+  std::array<StrideModel, 2> strides;  ///< [Foot]: mean stride of the moving foot.
+
+  /// Returns the vector from the fixed to the moving foot in the stand pose.
+  [[nodiscard]] DVec3 StandVector(Foot moving) const;
+};
+
+/// Feet at both ends of a step, as in the parameters of a general step.
+struct StepFeet {
+  DVec3 start_m = DVec3(0.0);  ///< From the fixed to the moving foot, in the heading frame.
+  DVec3 end_m = DVec3(0.0);
+  double turn_rad = 0.0;  ///< Positive is left.
+};
+
+/// Generates a step on level ground between two states of a person. A state is a mixture of the
+/// stand pose and of the mean stride of the captures at the same generic time. The share of the
+/// stride grows with the distance between the feet. So every generated step joins the captured
+/// steps and the stand, and has posture and style of the person:
+///
+///   posture(t) = (1 - w(t)) stand + w(t) stride(g(t))
+///
+/// where w changes smoothly from the share at the start to that at the end of the step.
+/// Feet are placed first, then the root, which follows a cubic curve plus w times the deviation of
+/// the captured root from such a curve. Then inverse kinematics places the legs.
+///
+/// `names` selects the parameters of the example, which are measured in its first and last pose.
+[[nodiscard]] RawExample MakeStep(const Person& person, Foot moving, const StepFeet& feet,
+                                  std::span<const ParameterName> names, std::string source);
+
+/// Generates a step backward: the step with the same feet in reverse order, reversed in time.
+/// `feet.start_m` has the moving foot in front, `feet.end_m` behind.
+[[nodiscard]] RawExample MakeBackwardStep(const Person& person, Foot moving, const StepFeet& feet,
+                                          std::span<const ParameterName> names, std::string source);
+
+}  // namespace stridewire::complete

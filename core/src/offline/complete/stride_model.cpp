@@ -1,0 +1,168 @@
+#include "offline/complete/stride_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "offline/base/statistics.h"
+#include "offline/builtin/elementary.h"
+#include "offline/extract/mirror.h"
+#include "runtime/skeleton/foot_vector.h"
+
+namespace stridewire::complete {
+namespace {
+
+using builtin::Ease;
+
+// Limits of the strides that are averaged: level, straight ahead, from stride to stride.
+constexpr double kMinLengthM = 0.25;
+constexpr double kMaxRiseM = 0.06;
+constexpr double kMaxTurnRad = 0.2;
+constexpr double kMaxWidthM = 0.4;
+// Strides whose length differs from the median by more than this are not averaged.
+constexpr double kSameLengthM = 0.12;
+
+struct Stride {
+  const RawExample* example = nullptr;
+  DVec3 start_m;  // From the fixed to the moving foot, in the heading frame.
+  DVec3 end_m;
+  [[nodiscard]] double length_m() const { return 0.5 * (end_m.z - start_m.z); }
+};
+
+// Returns the feet of a step example at both ends.
+Stride Measure(const Skeleton& skeleton, const RawExample& example, Foot moving) {
+  Pose last(skeleton.joint_count());
+  SampleClip(example.clip, example.keytimes_s.back(), last);
+  return {&example, FootVector(skeleton, example.clip.frame(0), moving, 0.0),
+          FootVector(skeleton, last, moving, example.heading_change_rad)};
+}
+
+bool IsStraightStride(const Stride& stride, Foot moving) {
+  const auto is_beside = [&](const DVec3& d) {
+    return Outward(moving) * d.x > 0.0 && Outward(moving) * d.x < kMaxWidthM &&
+           std::fabs(d.y) < kMaxRiseM;
+  };
+  return stride.example->keytimes_s.size() == kIntervals + 1 && -stride.start_m.z > kMinLengthM &&
+         stride.end_m.z > kMinLengthM && is_beside(stride.start_m) && is_beside(stride.end_m) &&
+         std::fabs(stride.example->heading_change_rad) < kMaxTurnRad;
+}
+
+// Returns the straight strides of a foot, from the first group that contains some: groups of
+// straight steps come first.
+std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
+  for (const RawGroup& group : library.groups) {
+    if (group.is_completed || group.kind != StepKind(moving)) continue;
+    std::vector<Stride> strides;
+    for (const RawExample& example : group.examples) {
+      const Stride stride = Measure(library.skeleton, example, moving);
+      if (IsStraightStride(stride, moving)) strides.push_back(stride);
+    }
+    if (strides.empty()) continue;
+    std::vector<double> lengths;
+    for (const Stride& stride : strides) lengths.push_back(stride.length_m());
+    const double median_m = Median(lengths);
+    std::erase_if(strides, [&](const Stride& stride) {
+      return std::fabs(stride.length_m() - median_m) > kSameLengthM;
+    });
+    return strides;
+  }
+  return {};
+}
+
+StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides, Foot moving) {
+  const auto fixed = static_cast<std::size_t>(OtherFoot(moving));
+  StrideModel model;
+  model.points.resize(kPointCount);
+  double count = 0.0;
+  for (const Stride& stride : strides) {
+    const RawExample& example = *stride.example;
+    Clip clip = example.clip;
+    MakeSignContinuous(clip);
+    Pose pose(skeleton.joint_count());
+    count += 1.0;
+    for (std::size_t p = 0; p < model.points.size(); ++p) {
+      SampleClip(clip, TimeAtPoint(example.keytimes_s, p), pose);
+      PostureSample sample =
+          SampleOf(skeleton, pose,
+                   Ease(static_cast<double>(p) / (kPointCount - 1)) * example.heading_change_rad);
+      DVec3 origin = sample.balls_m[fixed];
+      origin.y = 0.0;
+      sample.root_m -= origin;
+      for (DVec3& ball : sample.balls_m) ball -= origin;
+      model.points[p] = count == 1.0 ? sample : Blend(model.points[p], sample, 1.0 / count);
+    }
+    for (std::size_t k = 0; k < model.keytimes_s.size(); ++k) {
+      model.keytimes_s[k] += example.keytimes_s[k];
+    }
+    model.start_length_m -= stride.start_m.z;
+    model.end_length_m += stride.end_m.z;
+    model.width_m += 0.5 * Outward(moving) * (stride.start_m.x + stride.end_m.x);
+  }
+  for (double& keytime : model.keytimes_s) keytime /= count;
+  model.start_length_m /= count;
+  model.end_length_m /= count;
+  model.width_m /= count;
+  return model;
+}
+
+// Returns the mirror images of examples, or nothing if the skeleton cannot be mirrored.
+std::vector<RawExample> MirrorImages(const RawLibrary& library, const std::vector<Stride>& strides,
+                                     Foot moving) {
+  std::vector<ExtractedExample> sources;
+  for (const Stride& stride : strides) sources.push_back({StepKind(moving), *stride.example});
+  std::vector<const ExtractedExample*> pointers;
+  for (ExtractedExample& source : sources) {
+    source.example.parameters.clear();
+    pointers.push_back(&source);
+  }
+  const auto mirror =
+      FindSkeletonMirror(library.skeleton, MeasurePosture(library.skeleton, pointers));
+  std::vector<RawExample> images;
+  if (!mirror) return images;
+  for (const ExtractedExample& source : sources) {
+    images.push_back(MirrorExample(library.skeleton, *mirror, {}, source).example);
+  }
+  return images;
+}
+
+}  // namespace
+
+double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point) {
+  const std::size_t interval = std::min<std::size_t>(point / kPointsPerInterval, kIntervals - 1);
+  const double part =
+      static_cast<double>(point - interval * kPointsPerInterval) / kPointsPerInterval;
+  return keytimes_s[interval] + part * (keytimes_s[interval + 1] - keytimes_s[interval]);
+}
+
+PostureSample StrideModel::At(double generic_time) const {
+  const double at =
+      std::clamp(generic_time, 0.0, static_cast<double>(kIntervals)) * kPointsPerInterval;
+  const int i = std::min(static_cast<int>(at), kPointCount - 2);
+  const auto k = static_cast<std::size_t>(i);
+  return Blend(points[k], points[k + 1], at - i);
+}
+
+DVec3 StrideModel::StartVelocity() const {
+  constexpr int kSpan = kPointsPerInterval / 2;
+  return (points[kSpan].root_m - points[0].root_m) / (keytimes_s[1] * kSpan / kPointsPerInterval);
+}
+
+DVec3 StrideModel::EndVelocity() const {
+  constexpr int kSpan = kPointsPerInterval / 2;
+  return (points[kPointCount - 1].root_m - points[kPointCount - 1 - kSpan].root_m) /
+         ((keytimes_s[3] - keytimes_s[2]) * kSpan / kPointsPerInterval);
+}
+
+std::optional<StrideModel> MeasureStride(const RawLibrary& library, Foot moving) {
+  const std::vector<Stride> strides = FindStrides(library, moving);
+  if (!strides.empty()) return Average(library.skeleton, strides, moving);
+  const std::vector<Stride> others = FindStrides(library, OtherFoot(moving));
+  const std::vector<RawExample> images = MirrorImages(library, others, OtherFoot(moving));
+  std::vector<Stride> mirrored;
+  for (const RawExample& image : images) {
+    mirrored.push_back(Measure(library.skeleton, image, moving));
+  }
+  if (mirrored.empty()) return std::nullopt;
+  return Average(library.skeleton, mirrored, moving);
+}
+
+}  // namespace stridewire::complete

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "offline/complete/posture_mix.h"
+#include "stridewire/offline/raw_library.h"
+
+namespace stridewire::complete {
+
+/// Points of generic time per keytime interval at which the mean stride is stored.
+inline constexpr int kPointsPerInterval = 16;
+inline constexpr int kIntervals = 3;  ///< Start, toe-off, heel-strike, end.
+inline constexpr int kPointCount = kIntervals * kPointsPerInterval + 1;
+
+/// The mean of the level strides of one foot in the captures, straight ahead, by generic time. The
+/// horizontal origin is the ball of the fixed foot.
+struct StrideModel {
+  std::vector<PostureSample> points;  ///< [point]
+  std::array<double, kIntervals + 1> keytimes_s{};
+  double start_length_m = 0.0;  ///< Distance by which the fixed foot is ahead at the start.
+  double end_length_m = 0.0;    ///< Distance by which the moving foot is ahead at the end.
+  /// Sideways distance of the moving from the fixed foot, outwards; mean of start and end.
+  double width_m = 0.0;
+
+  /// Returns the posture at a generic time in [0, 3].
+  [[nodiscard]] PostureSample At(double generic_time) const;
+  /// Returns the velocity of the root at the start or the end, in m/s.
+  [[nodiscard]] DVec3 StartVelocity() const;
+  [[nodiscard]] DVec3 EndVelocity() const;
+};
+
+/// Returns the time of a point of a stride with these keytimes.
+[[nodiscard]] double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point);
+
+/// Returns the mean stride of a foot. Returns nullopt if the library contains no level stride of
+/// that foot that leads straight ahead. If it contains strides of the other foot only, their mirror
+/// images are used, as far as the skeleton can be mirrored.
+[[nodiscard]] std::optional<StrideModel> MeasureStride(const RawLibrary& library, Foot moving);
+
+}  // namespace stridewire::complete

@@ -1,0 +1,267 @@
+#include "offline/complete/complete_library.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "captured_library.h"
+#include "offline/builtin/builtin_library.h"
+#include "offline/inspect/self_check.h"
+#include "reframing.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/skeleton/foot_vector.h"
+#include "stridewire/offline/library_builder.h"
+#include "synthetic_walker.h"
+
+namespace stridewire {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+// A walk that neither stops nor turns.
+RawLibrary WalkWithoutStop() {
+  LibraryAssembler assembler;
+  assembler.Add(SyntheticWalker{}.Walk({{Foot::kLeft, 0.5},
+                                        {Foot::kRight, 0.6},
+                                        {Foot::kLeft, 0.55},
+                                        {Foot::kRight, 0.6},
+                                        {Foot::kLeft, 0.5},
+                                        {Foot::kRight, 0.55}}));
+  return assembler.Assemble().value();
+}
+
+RawLibrary Completed(RawLibrary library) {
+  const Completion completion = CompleteLibrary(library);
+  EXPECT_EQ(completion.failure, "");
+  EXPECT_GT(completion.example_count, 0);
+  return library;
+}
+
+std::vector<const RawGroup*> CompletedGroups(const RawLibrary& library) {
+  std::vector<const RawGroup*> groups;
+  for (const RawGroup& group : library.groups) {
+    if (group.is_completed) groups.push_back(&group);
+  }
+  return groups;
+}
+
+// Expects the checks of movement, but not those of the soles, which depend on the captures' ground.
+void ExpectToWalk(const std::shared_ptr<const MotionLibrary>& library) {
+  for (const CheckResult& check : CheckLibrary(library).checks) {
+    if (check.name == "soles") continue;
+    EXPECT_EQ(check.verdict, CheckVerdict::kPassed) << check.name << ": " << check.text;
+  }
+}
+
+TEST(CompleteLibrary, SaysWhatTheCapturesLack) {
+  RawLibrary library = WalkWithoutStop();
+  const Completion completion = CompleteLibrary(library);
+  EXPECT_THAT(completion.lacking, Contains("side steps"));
+  EXPECT_THAT(completion.lacking, Contains("steps backward"));
+  EXPECT_THAT(completion.lacking, Contains("turns on the spot"));
+  const std::vector<std::string> sentences = DescribeCompletion(completion);
+  ASSERT_GE(sentences.size(), 2u);
+  EXPECT_THAT(sentences.front(), HasSubstr("The captures lack "));
+  EXPECT_THAT(sentences.back(), HasSubstr("--no-complete"));
+}
+
+TEST(CompleteLibrary, AddsNothingToACompleteLibrary) {
+  RawLibrary library = GenerateBuiltinLibrary();
+  const std::size_t groups = library.groups.size();
+  const Completion completion = CompleteLibrary(library);
+  EXPECT_THAT(completion.lacking, testing::IsEmpty());
+  EXPECT_EQ(completion.example_count, 0);
+  EXPECT_EQ(library.groups.size(), groups);
+}
+
+TEST(CompleteLibrary, KeepsCapturedGroupsAndTheirStand) {
+  const RawLibrary before = WalkWithoutStop();
+  const RawLibrary after = Completed(before);
+  ASSERT_GT(after.groups.size(), before.groups.size());
+  for (std::size_t g = 0; g < before.groups.size(); ++g) {
+    ASSERT_EQ(after.groups[g].examples.size(), before.groups[g].examples.size());
+    EXPECT_FALSE(after.groups[g].is_completed);
+    for (std::size_t e = 0; e < before.groups[g].examples.size(); ++e) {
+      EXPECT_EQ(after.groups[g].examples[e].clip.rotations,
+                before.groups[g].examples[e].clip.rotations);
+      EXPECT_EQ(after.groups[g].examples[e].source, before.groups[g].examples[e].source);
+    }
+  }
+  EXPECT_EQ(after.stand_pose.rotations, before.stand_pose.rotations);
+  for (const RawGroup* group : CompletedGroups(after)) {
+    for (const RawExample& example : group->examples) {
+      EXPECT_TRUE(example.source.starts_with(kCompletedSource)) << example.source;
+    }
+  }
+}
+
+TEST(CompleteLibrary, StepsAreWellFormed) {
+  const RawLibrary library = Completed(WalkWithoutStop());
+  for (const RawGroup* group : CompletedGroups(library)) {
+    const Foot moving = MovingFoot(group->kind);
+    for (const RawExample& example : group->examples) {
+      SCOPED_TRACE(example.source);
+      EXPECT_TRUE(example.clip.Validate().has_value());
+      EXPECT_TRUE(ValidateKeytimes(example.keytimes_s).has_value());
+      EXPECT_NEAR(example.keytimes_s.back(), example.clip.duration_s(), 1e-9);
+      const DVec3 end =
+          FootVector(library.skeleton, example.clip.frame(example.clip.frame_count() - 1), moving,
+                     example.heading_change_rad);
+      const auto l = static_cast<std::size_t>(
+          std::ranges::find(group->parameters, ParameterName::kEndZ) - group->parameters.begin());
+      EXPECT_NEAR(example.parameters[l], end.z, 1e-6);
+      // The ball of the fixed foot stays in place.
+      const DVec3 first(BallPosition(library.skeleton, example.clip.frame(0), OtherFoot(moving)));
+      for (int f = 1; f < example.clip.frame_count(); ++f) {
+        const DVec3 ball(BallPosition(library.skeleton, example.clip.frame(f), OtherFoot(moving)));
+        ASSERT_LT(std::hypot(ball.x - first.x, ball.z - first.z), 2e-3) << "frame " << f;
+      }
+    }
+  }
+}
+
+// Frame by frame, joints turn no faster than people's do.
+TEST(CompleteLibrary, StepsAreSmooth) {
+  const RawLibrary library = Completed(WalkWithoutStop());
+  for (const RawGroup* group : CompletedGroups(library)) {
+    for (const RawExample& example : group->examples) {
+      const double limit_rad = 12.0 / example.clip.fps;
+      for (int f = 1; f < example.clip.frame_count(); ++f) {
+        ASSERT_LT(LargestJointAngle(example.clip.frame(f - 1), example.clip.frame(f)), limit_rad)
+            << example.source << ", frame " << f;
+      }
+    }
+  }
+}
+
+TEST(CompleteLibrary, StopsEndInTheStandPose) {
+  const RawLibrary library = Completed(WalkWithoutStop());
+  int stops = 0;
+  for (const RawGroup* group : CompletedGroups(library)) {
+    if (group->parameters.size() != 2) continue;
+    const DVec3 stand =
+        FootVector(library.skeleton, library.stand_pose, MovingFoot(group->kind), 0.0);
+    for (const RawExample& example : group->examples) {
+      if (std::fabs(example.parameters[1] - stand.z) > 0.01) continue;
+      ++stops;
+      const ConstPoseSpan end = example.clip.frame(example.clip.frame_count() - 1);
+      EXPECT_LT(LargestJointAngle(end, library.stand_pose), 0.02) << example.source;
+      EXPECT_NEAR(end.root_position_m.y, library.stand_pose.root_position_m.y, 2e-3)
+          << example.source;
+    }
+  }
+  EXPECT_GE(stops, 8);
+}
+
+// The same steps result from captures whose joints have other frames.
+TEST(CompleteLibrary, DoesNotDependOnTheAxesOfJoints) {
+  const RawLibrary raw = WalkWithoutStop();
+  const JointFrames frames = RandomFrames(raw.skeleton, 5);
+  const RawLibrary completed = Completed(raw);
+  const RawLibrary reframed = Completed(Reframed(raw, frames));
+  ASSERT_EQ(completed.groups.size(), reframed.groups.size());
+  std::vector<Vec3> positions[2];
+  std::vector<Quat> rotations(raw.skeleton.joints.size());
+  for (auto& p : positions) p.resize(raw.skeleton.joints.size());
+  for (std::size_t g = 0; g < completed.groups.size(); ++g) {
+    ASSERT_EQ(completed.groups[g].examples.size(), reframed.groups[g].examples.size());
+    for (std::size_t e = 0; e < completed.groups[g].examples.size(); ++e) {
+      const Clip& one = completed.groups[g].examples[e].clip;
+      const Clip& other = reframed.groups[g].examples[e].clip;
+      ASSERT_EQ(one.frame_count(), other.frame_count());
+      for (int f = 0; f < one.frame_count(); f += 10) {
+        ForwardKinematics(completed.skeleton, one.frame(f), positions[0], rotations);
+        ForwardKinematics(reframed.skeleton, other.frame(f), positions[1], rotations);
+        for (std::size_t j = 0; j < positions[0].size(); ++j) {
+          ASSERT_LT(glm::length(positions[0][j] - positions[1][j]), 1e-4f)
+              << completed.groups[g].examples[e].source << ", frame " << f << ", joint " << j;
+        }
+      }
+    }
+  }
+}
+
+TEST(CompleteLibrary, ComposesAStandIfNoneIsCaptured) {
+  RawLibrary library = WalkWithoutStop();
+  // The first stride starts with one foot ahead.
+  const ConstPoseSpan stride = library.groups.front().examples[1].clip.frame(0);
+  ASSERT_GT(std::fabs(FootVector(library.skeleton, stride, Foot::kLeft, 0.0).z), 0.3);
+  library.stand_pose.root_position_m = stride.root_position_m;
+  library.stand_pose.rotations.assign(stride.rotations.begin(), stride.rotations.end());
+  const Completion completion = CompleteLibrary(library);
+  EXPECT_TRUE(completion.has_composed_stand);
+  const DVec3 feet = FootVector(library.skeleton, library.stand_pose, Foot::kLeft, 0.0);
+  EXPECT_NEAR(feet.z, 0.0, 0.02);
+  EXPECT_NEAR(feet.y, 0.0, 0.02);
+  EXPECT_GT(feet.x, 0.1);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    EXPECT_NEAR(BallPosition(library.skeleton, library.stand_pose, foot).y, kWalkerBallHeightM,
+                0.02);
+  }
+}
+
+TEST(CompleteLibrary, LibrariesOfOneWalkOrJumpCanWalk) {
+  ExpectToWalk(LibraryBuilder::Selecting().Build(Completed(WalkWithoutStop())).value());
+  LibraryAssembler jumps;
+  jumps.Add(SyntheticWalker{}.Jump(0.8));
+  ExpectToWalk(LibraryBuilder::Selecting().Build(Completed(jumps.Assemble().value())).value());
+}
+
+TEST(CompleteLibrary, BuilderStoresAllGeneratedSteps) {
+  const RawLibrary raw = Completed(WalkWithoutStop());
+  const auto library = LibraryBuilder::Selecting().Build(raw).value();
+  ASSERT_EQ(library->groups().size(), raw.groups.size());
+  for (std::size_t g = 0; g < raw.groups.size(); ++g) {
+    EXPECT_EQ(library->groups()[g].is_completed, raw.groups[g].is_completed);
+    if (!raw.groups[g].is_completed) continue;
+    EXPECT_EQ(library->groups()[g].example_count, static_cast<int>(raw.groups[g].examples.size()));
+  }
+}
+
+TEST(CompleteLibrary, CapturedStepsArePreferred) {
+  const auto library = LibraryBuilder::Selecting().Build(Completed(WalkWithoutStop())).value();
+  const MotionGroup& captured = library->groups().front();
+  ASSERT_FALSE(captured.is_completed);
+  const auto site = captured.site(0);
+  const Foot moving = MovingFoot(captured.kind);
+  FootState feet;
+  const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
+  feet.left_from_right_m = DVec3(0.2, 0.0, outward * site[0]);
+  const auto plan =
+      PlanStep(*library, {.foot = moving, .length_m = site[1]}, feet, OtherFoot(moving), false);
+  ASSERT_TRUE(plan.has_value());
+  EXPECT_EQ(plan->group, 0);
+  feet.left_from_right_m = DVec3(0.2, 0.0, 0.0);
+  const auto back =
+      PlanStep(*library, {.foot = moving, .length_m = -0.3}, feet, OtherFoot(moving), true);
+  ASSERT_TRUE(back.has_value());
+  EXPECT_TRUE(library->group(back->group).is_completed);
+  EXPECT_FALSE(back->clamped);
+}
+
+class CompleteCaptures : public testing::TestWithParam<const char*> {};
+
+// Each take alone, without mirror images, is the hardest case.
+TEST_P(CompleteCaptures, EveryTakeCanWalkAndStop) {
+  const std::vector<std::string> subjects = {GetParam()};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  for (const std::filesystem::path& take : TakesOf(subjects)) {
+    SCOPED_TRACE(take.string());
+    ExpectToWalk(LibraryBuilder::Selecting().Build(Completed(AssembleTakes({take}, {}))).value());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Subjects, CompleteCaptures,
+                         testing::Values(kDebianTakes, "05", "06", "09", "29", "32"),
+                         [](const auto& param) {
+                           std::string name = param.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace stridewire
