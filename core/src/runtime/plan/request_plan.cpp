@@ -31,6 +31,10 @@ constexpr double kStraightPreferenceM = 0.15;
 // Extra cost of a group whose steps were generated because the captures lack them. Captured steps
 // are preferred if they fit nearly as well.
 constexpr double kCompletedCostM = 0.02;
+// Beside such groups, captured groups cost more where no example is near. With few examples and
+// many parameters, most of the hull is far from all of them, and blends there resemble none.
+constexpr double kNearExampleM = 0.15;
+constexpr double kFarExampleWeight = 0.5;
 // Extra cost per metre outside the hull of the examples, even where requests may extrapolate.
 constexpr double kOutsideWeight = 0.25;
 // Tolerances for the start of a step in groups without a start parameter for side or height. Such a
@@ -92,11 +96,29 @@ double DistanceOutsideRange(const MotionGroup& group, std::span<const double> me
   return std::sqrt(sum);
 }
 
+// Returns the extra cost of a captured group in a completed library for steps with these
+// parameters.
+double FarFromExamplesCost(const MotionGroup& group, std::span<const double> values) {
+  double nearest = HUGE_VAL;
+  for (int e = 0; e < group.example_count; ++e) {
+    const auto site = group.site(e);
+    double sum = 0.0;
+    for (std::size_t l = 0; l < values.size(); ++l) {
+      const bool is_turn = group.parameters[l].name == ParameterName::kTurn;
+      const double away = (is_turn ? kMetresPerRadian : 1.0) * (values[l] - site[l]);
+      sum += away * away;
+    }
+    nearest = std::min(nearest, sum);
+  }
+  return kFarExampleWeight * std::max(0.0, std::sqrt(nearest) - kNearExampleM);
+}
+
 // Plans a request in one group. Returns nullopt if its cost plus `group_cost_m` is not less than
 // `best_cost_m`.
 std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_index,
                                        const ParameterGoals& goals, double stand_side_m,
-                                       double group_cost_m, double best_cost_m) {
+                                       double group_cost_m, double best_cost_m,
+                                       bool is_completed_library) {
   const MotionGroup& group = library.group(group_index);
   const std::size_t d = group.parameters.size();
   RequestPlan plan;
@@ -166,6 +188,9 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   }
   plan.distance_m += missed_m;
   plan.cost_m = plan.distance_m + kOutsideWeight * outside_m + start_error_m;
+  if (is_completed_library && !group.is_completed) {
+    plan.cost_m += FarFromExamplesCost(group, std::span(plan.applied.values).first(d));
+  }
   if (plan.cost_m + group_cost_m >= best_cost_m) return std::nullopt;
   return plan;
 }
@@ -175,14 +200,16 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
                                     bool is_straight) {
   std::optional<RequestPlan> best;
   double best_cost_m = HUGE_VAL;
+  const bool is_completed_library =
+      IsStep(kind) && std::ranges::any_of(library.groups(), &MotionGroup::is_completed);
   for (std::size_t g = 0; g < library.groups().size(); ++g) {
     const MotionGroup& group = library.groups()[g];
     if (group.kind != kind) continue;
     double group_cost_m = kCostPerParameterM * group.parameter_count();
     if (is_straight && IsGeneral(group)) group_cost_m += kStraightPreferenceM;
     if (group.is_completed) group_cost_m += kCompletedCostM;
-    const auto plan =
-        PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m, best_cost_m);
+    const auto plan = PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m,
+                                  best_cost_m, is_completed_library);
     if (!plan) continue;
     STRIDEWIRE_CHECK(plan->cost_m + group_cost_m < best_cost_m);
     best_cost_m = plan->cost_m + group_cost_m;
