@@ -320,6 +320,7 @@ Completion CompleteLibrary(RawLibrary& library) {
     }
     completion.has_generic_strides = true;
   }
+  complete::JoinStrides(person.strides);
 
   LackingList lacking;
   for (const WantedGroup& group : Catalogue(person).Groups()) {

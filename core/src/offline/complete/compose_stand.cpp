@@ -24,7 +24,7 @@ constexpr double kMinStandWidthM = 0.16;
 constexpr double kMaxStandWidthM = 0.24;
 constexpr double kHipsAheadM = 0.03;  // The hips are this far ahead of the ankles.
 // Generic time at which the fixed foot is flat: the other foot swings past it.
-constexpr double kFlat = 1.4;
+constexpr double kFlat = 1.3;
 
 double KneeRad(const LegRig::Side& side, const LegPose& leg) {
   const auto at = [&](int place) {

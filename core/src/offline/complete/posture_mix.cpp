@@ -45,6 +45,12 @@ PostureSample SampleOf(const Skeleton& skeleton, ConstPoseSpan pose, double head
   return sample;
 }
 
+DVec3 RootFromFeet(const PostureSample& sample) {
+  DVec3 middle = 0.5 * (sample.balls_m[0] + sample.balls_m[1]);
+  middle.y = 0.0;
+  return sample.root_m - middle;
+}
+
 Pose ToPose(const PostureSample& sample) {
   Pose pose(static_cast<int>(sample.rotations.size()));
   pose.root_position_m = Vec3(sample.root_m);

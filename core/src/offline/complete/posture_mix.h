@@ -35,6 +35,9 @@ struct PostureSample {
 [[nodiscard]] PostureSample SampleOf(const Skeleton& skeleton, ConstPoseSpan pose,
                                      double heading_rad);
 
+/// Returns the position of the root relative to the ground in the middle between the balls.
+[[nodiscard]] DVec3 RootFromFeet(const PostureSample& sample);
+
 /// Converts to a pose in single precision.
 [[nodiscard]] Pose ToPose(const PostureSample& sample);
 

@@ -33,8 +33,8 @@ constexpr double kSwingBegin = 0.92;
 constexpr double kSwingEnd = 2.06;
 // Least share of the captured swing in the pitch and the height of the swinging foot.
 constexpr double kMinSwingShare = 0.45;
-constexpr double kClearanceM = 0.02;
-constexpr double kTipClearanceM = 0.014;
+constexpr double kClearanceM = 0.024;
+constexpr double kTipClearanceM = 0.02;
 constexpr double kLiftStepM = 0.004;
 constexpr double kMaxLiftM = 0.12;
 constexpr double kFootWidthM = 0.09;  // Least distance between feet that pass each other.
@@ -187,18 +187,11 @@ class StepGenerator {
     return share + std::max(0.0, kMinSwingShare - share) * Bump(SwingAt(GenericAt(time_s)));
   }
 
-  // Returns the root relative to the middle between the balls of a sample.
-  static DVec3 RootFromFeet(const PostureSample& sample) {
-    DVec3 middle = 0.5 * (sample.balls_m[0] + sample.balls_m[1]);
-    middle.y = 0.0;
-    return sample.root_m - middle;
-  }
-
   void PlanRoot() {
     const PostureSample& first = stride_.points.front();
     const PostureSample& last = stride_.points.back();
-    captured_ = {first.root_m, stride_.StartVelocity(), last.root_m, stride_.EndVelocity(),
-                 stride_.keytimes_s[3]};
+    captured_ = {first.root_m, stride_.MeasuredStartVelocity(), last.root_m,
+                 stride_.MeasuredEndVelocity(), stride_.keytimes_s[3]};
     const auto state = [&](const PostureSample& stride, const DVec3& feet_m, double share) {
       const DVec3 from_feet = RootFromFeet(person_.stand) +
                               share * (RootFromFeet(stride) - RootFromFeet(person_.stand));
@@ -206,8 +199,8 @@ class StepGenerator {
     };
     root_.from = state(first, feet_.start_m, start_share_);
     root_.to = RotateYaw(feet_.turn_rad, state(last, feet_.end_m, end_share_));
-    root_.from_velocity = start_share_ * captured_.from_velocity;
-    root_.to_velocity = RotateYaw(feet_.turn_rad, end_share_ * captured_.to_velocity);
+    root_.from_velocity = start_share_ * stride_.start_velocity;
+    root_.to_velocity = RotateYaw(feet_.turn_rad, end_share_ * stride_.end_velocity);
     // A cubic curve would overshoot if it had to cover a short distance from a high speed.
     const auto limit = [&](DVec3& velocity) {
       const DVec3 way = root_.to - root_.from;

@@ -18,8 +18,13 @@ constexpr double kMinLengthM = 0.25;
 constexpr double kMaxRiseM = 0.06;
 constexpr double kMaxTurnRad = 0.2;
 constexpr double kMaxWidthM = 0.4;
+// The ball of the foot rises by about 0.1 m in a walk. It rises further in steps over or onto
+// things.
+constexpr double kPlainLiftM = 0.14;
 // Strides whose length differs from the median by more than this are not averaged.
 constexpr double kSameLengthM = 0.12;
+// Half width of the window that smooths a single stride.
+constexpr double kRoughWindowS = 0.15;
 
 struct Stride {
   const RawExample* example = nullptr;
@@ -34,6 +39,21 @@ Stride Measure(const Skeleton& skeleton, const RawExample& example, Foot moving)
   SampleClip(example.clip, example.keytimes_s.back(), last);
   return {&example, FootVector(skeleton, example.clip.frame(0), moving, 0.0),
           FootVector(skeleton, last, moving, example.heading_change_rad)};
+}
+
+// Returns how far the ball of the moving foot rises above its final height.
+double Lift(const Skeleton& skeleton, const RawExample& example, Foot moving) {
+  Pose pose(skeleton.joint_count());
+  const auto height_m = [&](double time_s) {
+    SampleClip(example.clip, time_s, pose);
+    return static_cast<double>(BallPosition(skeleton, pose, moving).y);
+  };
+  const double end_m = height_m(example.keytimes_s.back());
+  double lift_m = 0.0;
+  for (std::size_t p = kPointsPerInterval; p < 2 * kPointsPerInterval; p += 2) {
+    lift_m = std::max(lift_m, height_m(TimeAtPoint(example.keytimes_s, p)) - end_m);
+  }
+  return lift_m;
 }
 
 bool IsStraightStride(const Stride& stride, Foot moving) {
@@ -54,7 +74,9 @@ std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
     std::vector<Stride> strides;
     for (const RawExample& example : group.examples) {
       const Stride stride = Measure(library.skeleton, example, moving);
-      if (IsStraightStride(stride, moving)) strides.push_back(stride);
+      if (!IsStraightStride(stride, moving)) continue;
+      if (Lift(library.skeleton, example, moving) > kPlainLiftM) continue;
+      strides.push_back(stride);
     }
     if (strides.empty()) continue;
     std::vector<double> lengths;
@@ -66,6 +88,35 @@ std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
     return strides;
   }
   return {};
+}
+
+// Smooths the body over time, but not the feet. The window becomes shorter towards both ends, which
+// do not change.
+void SmoothBody(double window_s, StrideModel& model) {
+  std::vector<double> times_s;
+  for (std::size_t p = 0; p < model.points.size(); ++p) {
+    times_s.push_back(TimeAtPoint(model.keytimes_s, p));
+  }
+  const std::vector<PostureSample> rough = model.points;
+  for (std::size_t p = 1; p + 1 < rough.size(); ++p) {
+    const double half_s =
+        std::min({window_s, times_s[p] - times_s.front(), times_s.back() - times_s[p]});
+    PostureSample& point = model.points[p];
+    double sum = 0.0;
+    for (std::size_t k = 0; k < rough.size(); ++k) {
+      // The points are not evenly spaced in time, so each counts for the time that it stands for.
+      const double spacing_s =
+          0.5 * (times_s[std::min(k + 1, rough.size() - 1)] - times_s[k == 0 ? 0 : k - 1]);
+      const double near = 1.0 - std::fabs(times_s[k] - times_s[p]) / half_s;
+      if (near <= 0.0) continue;
+      sum += spacing_s * near;
+      const double share = spacing_s * near / sum;
+      point.root_m += share * (rough[k].root_m - point.root_m);
+      for (std::size_t j = 0; j < point.rotations.size(); ++j) {
+        point.rotations[j] = Blend(point.rotations[j], rough[k].rotations[j], share);
+      }
+    }
+  }
 }
 
 StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides, Foot moving) {
@@ -101,6 +152,8 @@ StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides
   model.start_length_m /= count;
   model.end_length_m /= count;
   model.width_m /= count;
+  // A mean of few strides contains what happened in one of them by chance.
+  SmoothBody(kRoughWindowS / std::sqrt(count), model);
   return model;
 }
 
@@ -141,15 +194,51 @@ PostureSample StrideModel::At(double generic_time) const {
   return Blend(points[k], points[k + 1], at - i);
 }
 
-DVec3 StrideModel::StartVelocity() const {
+DVec3 StrideModel::MeasuredStartVelocity() const {
   constexpr int kSpan = kPointsPerInterval / 2;
   return (points[kSpan].root_m - points[0].root_m) / (keytimes_s[1] * kSpan / kPointsPerInterval);
 }
 
-DVec3 StrideModel::EndVelocity() const {
+DVec3 StrideModel::MeasuredEndVelocity() const {
   constexpr int kSpan = kPointsPerInterval / 2;
   return (points[kPointCount - 1].root_m - points[kPointCount - 1 - kSpan].root_m) /
          ((keytimes_s[3] - keytimes_s[2]) * kSpan / kPointsPerInterval);
+}
+
+void JoinStrides(std::array<StrideModel, 2>& strides) {
+  constexpr double kShare = 0.5;
+  for (const Foot ahead : {Foot::kLeft, Foot::kRight}) {
+    StrideModel& before = strides[static_cast<std::size_t>(ahead)];
+    StrideModel& after = strides[static_cast<std::size_t>(OtherFoot(ahead))];
+    const PostureSample end = before.points.back();
+    const PostureSample start = after.points.front();
+    const auto correct = [&](const PostureSample& from, const PostureSample& to, double weight,
+                             double foot_weight, PostureSample& point) {
+      for (std::size_t j = 0; j < point.rotations.size(); ++j) {
+        const DQuat target = Blend(from.rotations[j], to.rotations[j], kShare);
+        const DQuat& q = point.rotations[j];
+        point.rotations[j] = Blend(q, target * glm::conjugate(from.rotations[j]) * q, weight);
+      }
+      for (std::size_t f = 0; f < 2; ++f) {
+        const DQuat target = Blend(from.ankles[f], to.ankles[f], kShare);
+        const DQuat& q = point.ankles[f];
+        point.ankles[f] = Blend(q, target * glm::conjugate(from.ankles[f]) * q, foot_weight);
+        point.balls_m[f].y += foot_weight * kShare * (to.balls_m[f].y - from.balls_m[f].y);
+      }
+      point.root_m += weight * kShare * (RootFromFeet(to) - RootFromFeet(from));
+    };
+    constexpr int kHalf = kPointCount / 2;
+    for (int i = 0; i < kHalf; ++i) {
+      const double weight = 1.0 - Ease(static_cast<double>(i) / kHalf);
+      // Feet are corrected in double support only, so that a standing foot stays flat.
+      const double foot_weight = 1.0 - Ease(static_cast<double>(i) / kPointsPerInterval);
+      correct(end, start, weight, foot_weight,
+              before.points[static_cast<std::size_t>(kPointCount - 1 - i)]);
+      correct(start, end, weight, foot_weight, after.points[static_cast<std::size_t>(i)]);
+    }
+    before.end_velocity = after.start_velocity =
+        0.5 * (before.MeasuredEndVelocity() + after.MeasuredStartVelocity());
+  }
 }
 
 std::optional<StrideModel> MeasureStride(const RawLibrary& library, Foot moving) {

@@ -26,12 +26,22 @@ struct StrideModel {
   /// Sideways distance of the moving from the fixed foot, outwards; mean of start and end.
   double width_m = 0.0;
 
+  /// Velocities of the root in steps that join others, in m/s. They agree with those of the strides
+  /// of the other foot after JoinStrides.
+  DVec3 start_velocity = DVec3(0.0);
+  DVec3 end_velocity = DVec3(0.0);
+
   /// Returns the posture at a generic time in [0, 3].
   [[nodiscard]] PostureSample At(double generic_time) const;
-  /// Returns the velocity of the root at the start or the end, in m/s.
-  [[nodiscard]] DVec3 StartVelocity() const;
-  [[nodiscard]] DVec3 EndVelocity() const;
+  /// Returns the velocity of the root in the mean stride itself, in m/s.
+  [[nodiscard]] DVec3 MeasuredStartVelocity() const;
+  [[nodiscard]] DVec3 MeasuredEndVelocity() const;
 };
+
+/// Makes the strides of both feet continue each other. The end of one and the start of the other
+/// are measured on different steps, so that they differ. Both get the mean posture and velocity,
+/// and the differences are distributed over half of each stride.
+void JoinStrides(std::array<StrideModel, 2>& strides);
 
 /// Returns the time of a point of a stride with these keytimes.
 [[nodiscard]] double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point);

@@ -157,6 +157,38 @@ TEST(CompleteLibrary, StopsEndInTheStandPose) {
   EXPECT_GE(stops, 8);
 }
 
+// A stride of one foot ends in the pose in which a stride of the other foot starts.
+TEST(CompleteLibrary, StridesContinueEachOther) {
+  const RawLibrary library = Completed(WalkWithoutStop());
+  // Returns the longest step of a foot, among straight steps.
+  const auto longest = [&](Foot foot) {
+    const RawExample* best = nullptr;
+    for (const RawGroup* group : CompletedGroups(library)) {
+      if (group->kind != StepKind(foot) || group->parameters.size() != 2) continue;
+      for (const RawExample& example : group->examples) {
+        const double length_m = example.parameters[1] - example.parameters[0];
+        if (best == nullptr || length_m > best->parameters[1] - best->parameters[0]) {
+          best = &example;
+        }
+      }
+    }
+    return best;
+  };
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const RawExample* before = longest(foot);
+    const RawExample* after = longest(OtherFoot(foot));
+    ASSERT_TRUE(before != nullptr && after != nullptr);
+    const ConstPoseSpan end = before->clip.frame(before->clip.frame_count() - 1);
+    const ConstPoseSpan start = after->clip.frame(0);
+    EXPECT_LT(LargestJointAngle(end, start), 0.06);
+    EXPECT_NEAR(end.root_position_m.y, start.root_position_m.y, 0.01);
+    const Vec3 end_step =
+        end.root_position_m - before->clip.frame(before->clip.frame_count() - 2).root_position_m;
+    const Vec3 start_step = after->clip.frame(1).root_position_m - start.root_position_m;
+    EXPECT_NEAR(end_step.z * before->clip.fps, start_step.z * after->clip.fps, 0.2);
+  }
+}
+
 // The same steps result from captures whose joints have other frames.
 TEST(CompleteLibrary, DoesNotDependOnTheAxesOfJoints) {
   const RawLibrary raw = WalkWithoutStop();
