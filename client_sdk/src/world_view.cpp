@@ -106,7 +106,7 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
                           .discontinuity = (batch.flags[i] & protocol::kPoseDiscontinuity) != 0,
                           .standing = (batch.flags[i] & protocol::kPoseStanding) != 0,
                           .detail = protocol::DetailOf(info.mode)};
-    Push(*track, {info.shard, info.mode}, stamp, root_position_m, scratch_, counts);
+    Push(*track, {info.shard, info.mode}, stamp, {root_position_m, scratch_}, counts);
   }
   if (shard.parts_seen >= info.parts) MarkMissingAsGone(info);
   return {};
@@ -126,10 +126,10 @@ WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
   return &track->second;
 }
 
-void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3& root_position_m,
-                     std::span<const Quat> rotations, Counts& counts) {
+void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose,
+                     Counts& counts) {
   stamp.discontinuity |= track.epoch != epoch_;
-  if (track.history->Push(stamp, root_position_m, rotations)) {
+  if (track.history->Push(stamp, pose.root_position_m, pose.rotations)) {
     ++counts.poses;
     track.epoch = epoch_;
     track.gone = false;
@@ -146,8 +146,7 @@ void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const Pos
                        ConstPoseSpan pose) {
   if (stamp.tick % replica_every_n_ticks_ != 0 || !Wants(avatar)) return;
   if (Track* track = FindOrAddTrack(avatar); track != nullptr) {
-    Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose.root_position_m,
-         pose.rotations, *replica_counts_);
+    Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose, *replica_counts_);
   } else {
     ++replica_counts_->refused;
   }

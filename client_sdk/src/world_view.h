@@ -114,8 +114,7 @@ class WorldView : public PoseSink {
   }
   /// Finds or creates the track of an avatar. Returns null if there is no memory for it.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
-  void Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3& root_position_m,
-            std::span<const Quat> rotations, Counts& counts);
+  void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
 
   /// Must be called after the last part of a batch. Marks avatars of its shard and mode that were
   /// not in it as gone.
