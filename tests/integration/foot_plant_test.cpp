@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "captured_library.h"
+#include "offline/inspect/leg_survey.h"
 #include "plant_measure.h"
 #include "random.h"
 #include "stridewire/offline/bvh_reader.h"
@@ -168,6 +169,23 @@ TEST_P(FootPlant, RandomStepsLandOnTheirFootprintsAndStayThere) {
   EXPECT_LE(after_p99, 1.5 * before_p99);
   EXPECT_LE(figures.largest_join_step.joint_rad_s, 1.5 * examples.joint_rad_s);
   EXPECT_LE(figures.largest_join_step.root_m_s, std::max(0.5, 1.5 * examples.root_m_s));
+}
+
+// The ground is level, so standing soles stay on it, whatever heights the captured feet had.
+TEST_P(FootPlant, SolesStayOnLevelGround) {
+  const Walker& walker = GetParam();
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
+  const Library library = LibraryOf(walker.subjects);
+  const unsigned seed = 20261125;
+  const Trail trail = RandomTrail(walker, library, 300, seed);
+  const auto synthesis = Synthesize({.library = library, .requests = trail.requests, .fps = kFps});
+  ASSERT_TRUE(synthesis.has_value());
+  LegDeviations legs;
+  SurveyLegs(*library, *synthesis, true, legs);
+  std::printf("%s: seed %u, soles at most %.1f mm above the ground, balls %.1f mm below it\n",
+              walker.name, seed, 1e3 * legs.hover_m, 1e3 * legs.sink_m);
+  EXPECT_LE(legs.hover_m, 0.02);
+  EXPECT_LE(legs.sink_m, 0.01);
 }
 
 // A footprint in reach is met even if the examples do not span the step. For one out of reach, the

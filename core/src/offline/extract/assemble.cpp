@@ -8,7 +8,9 @@
 
 #include "base/check.h"
 #include "offline/base/statistics.h"
+#include "offline/extract/level_feet.h"
 #include "offline/extract/mirror.h"
+#include "runtime/library/knee_hinges.h"
 
 namespace stridewire {
 namespace {
@@ -131,6 +133,12 @@ class Assembler {
       }
       ball_height_m_[f] = Median(std::move(heights));
     }
+    if (const auto examples = Examples(); !examples.empty()) {
+      std::vector<const Clip*> clips;
+      for (const ExtractedExample* example : examples) clips.push_back(&example->example.clip);
+      const ConstPoseSpan first = clips.front()->frame(0);
+      leveller_.emplace(skeleton, first, LearnKneeHinges(skeleton, first, clips), ball_height_m_);
+    }
   }
 
   Expected<RawLibrary> Run() {
@@ -176,10 +184,12 @@ class Assembler {
     return std::fabs(left) < std::fabs(right) ? left : right;
   }
 
-  void Append(const ExtractedExample& from, const Extraction& file, Pool& pool) const {
-    if (from.kind != pool.kind) return;
-    pool.examples.push_back(from.example);
-    Raise(pool.examples.back().clip, Shift(file));
+  void Append(ExtractedExample example, const Extraction& file, Pool& pool) const {
+    if (example.kind != pool.kind) return;
+    STRIDEWIRE_CHECK(leveller_.has_value());
+    leveller_->Level(example, pool.names);
+    Raise(example.example.clip, Shift(file));
+    pool.examples.push_back(std::move(example.example));
   }
 
   template <typename Member, typename Keep>
@@ -275,6 +285,7 @@ class Assembler {
     if (best != nullptr) {
       Pose pose = best->stand->pose;
       Raise(pose, Shift(*best));
+      leveller_->Level(PoseSpan(pose));
       return pose;
     }
     const ConstPoseSpan first = library.groups.front().examples.front().clip.frame(0);
@@ -288,7 +299,8 @@ class Assembler {
   const Skeleton& skeleton_;
   std::span<const Extraction> files_;
   std::optional<SkeletonMirror> mirror_;
-  double ball_height_m_[2] = {0.0, 0.0};
+  std::array<double, 2> ball_height_m_{};  // [foot]
+  std::optional<FeetLeveller> leveller_;   // Set if there is an example.
 };
 
 bool SameOffsets(const Skeleton& a, const Skeleton& b) {

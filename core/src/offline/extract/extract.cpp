@@ -16,6 +16,7 @@
 #include "offline/extract/root_motion.h"
 #include "offline/extract/stand_pose.h"
 #include "offline/extract/still_ends.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {
@@ -219,12 +220,19 @@ class Extractor {
     general.example.parameters = {d0.x, d0.y, d0.z, d1.x, d1.y, d1.z, to - from};
     general.example.heading_change_rad = to - from;
     general.level = IsLevel(step);
+    if (general.level) {
+      auto& ground_m = general.ground_m[static_cast<std::size_t>(step.moving)];
+      ground_m = {GroundBelow(step.moving, step.before_contact) - ground,
+                  GroundBelow(step.moving, step.after_contact) - ground};
+    }
+    const auto ground_m = general.ground_m;
     out_.general_steps.push_back(std::move(general));
 
     double heading = 0.5 * (from + to);
     if (!IsStraight(step, heading)) return;
     ExtractedExample straight{
         kind, Cut(frames, heading, ground, {step.start, step.toe_off, step.heel_strike, step.end})};
+    straight.ground_m = ground_m;
     straight.example.parameters = {FootVectorAt(step.moving, step.start, heading).z,
                                    FootVectorAt(step.moving, step.end, heading).z};
     out_.straight_steps.push_back(std::move(straight));
@@ -307,6 +315,11 @@ class Extractor {
         Cut(frames, from, ground,
             {jump.start, jump.crouch, jump.toe_off, jump.landing, jump.absorb, jump.end}),
         jump.settled};
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const auto f = static_cast<std::size_t>(foot);
+      out.ground_m[f] = {GroundBelow(foot, jump.before_contact[f]) - ground,
+                         GroundBelow(foot, jump.after_contact[f]) - ground - rise};
+    }
     const double length = RotateYaw(-from, centre_to - centre_from).z;
     out.example.parameters = {length, rise, to - from};
     out.example.heading_change_rad = to - from;
@@ -330,6 +343,31 @@ class Extractor {
 };
 
 }  // namespace
+
+void MeasureFootVectors(const Skeleton& skeleton, std::span<const ParameterName> names,
+                        ExtractedExample& step) {
+  if (!IsStep(step.kind)) return;
+  STRIDEWIRE_CHECK(names.size() == step.example.parameters.size());
+  const Clip& clip = step.example.clip;
+  const Foot moving = MovingFoot(step.kind);
+  const DVec3 start = FootVector(skeleton, clip.frame(0), moving, 0.0);
+  const DVec3 end = FootVector(skeleton, clip.frame(clip.frame_count() - 1), moving,
+                               step.example.heading_change_rad);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    double& value = step.example.parameters[i];
+    switch (names[i]) {
+      case ParameterName::kStartX: value = start.x; break;
+      case ParameterName::kStartY: value = start.y; break;
+      case ParameterName::kStartZ: value = start.z; break;
+      case ParameterName::kEndX: value = end.x; break;
+      case ParameterName::kEndY: value = end.y; break;
+      case ParameterName::kEndZ: value = end.z; break;
+      case ParameterName::kTurn:
+      case ParameterName::kLength:
+      case ParameterName::kHeight: break;
+    }
+  }
+}
 
 Extraction Extract(const Capture& capture, const ExtractOptions& options) {
   return Extractor(capture, options).Run();

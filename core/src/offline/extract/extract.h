@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -42,6 +44,10 @@ struct ExtractedExample {
   RawExample example;
   bool settled = true;  ///< Jumps: false if the figure is still moving at the end.
   bool level = true;    ///< Steps: true if the ground at all three footholds is equal within 5 cm.
+  /// [foot][0 before, 1 after its swing]: height of the ground in the capture at each foothold,
+  /// relative to where it ought to be: on one level for steps on level ground, and on one level
+  /// before and one after a jump. 0 for steps between different heights.
+  std::array<std::array<double, 2>, 2> ground_m{};
 };
 
 /// A time span of a capture that is not usable, in seconds since its first frame.
@@ -93,6 +99,11 @@ inline constexpr ParameterName kStraightStepParameters[] = {ParameterName::kStar
                                                             ParameterName::kEndZ};
 inline constexpr ParameterName kJumpParameters[] = {ParameterName::kLength, ParameterName::kHeight,
                                                     ParameterName::kTurn};
+
+/// Measures the parameters of a step that are foot vectors, again, in the first and last frame of
+/// its clip. `names` are the names of its parameters. Does nothing for jumps.
+void MeasureFootVectors(const Skeleton& skeleton, std::span<const ParameterName> names,
+                        ExtractedExample& step);
 
 /// Finds the steps and standing jumps of a capture and cuts them out as normalised examples.
 ///

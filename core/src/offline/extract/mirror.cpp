@@ -239,6 +239,7 @@ ExtractedExample MirrorExample(const Skeleton& skeleton, const SkeletonMirror& m
   out.example.mirrored = !source.example.mirrored;
   out.example.heading_change_rad = -source.example.heading_change_rad;
   if (IsStep(source.kind)) out.kind = StepKind(OtherFoot(MovingFoot(source.kind)));
+  std::swap(out.ground_m[0], out.ground_m[1]);
   Clip& clip = out.example.clip;
   std::vector<DQuat> mirrored(skeleton.joints.size());
   for (int f = 0; f < clip.frame_count(); ++f) {
@@ -252,25 +253,10 @@ ExtractedExample MirrorExample(const Skeleton& skeleton, const SkeletonMirror& m
     SetWorldRotations(skeleton, mirrored, to);
   }
   MakeSignContinuous(clip);
-  const bool step = IsStep(out.kind);
-  const Foot moving = step ? MovingFoot(out.kind) : Foot::kLeft;
-  const DVec3 start = FootVector(skeleton, clip.frame(0), moving, 0.0);
-  const DVec3 end = FootVector(skeleton, clip.frame(clip.frame_count() - 1), moving,
-                               out.example.heading_change_rad);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    double& value = out.example.parameters[i];
-    switch (names[i]) {
-      case ParameterName::kStartX: value = start.x; break;
-      case ParameterName::kStartY: value = start.y; break;
-      case ParameterName::kStartZ: value = start.z; break;
-      case ParameterName::kEndX: value = end.x; break;
-      case ParameterName::kEndY: value = end.y; break;
-      case ParameterName::kEndZ: value = end.z; break;
-      case ParameterName::kTurn: value = -value; break;
-      case ParameterName::kLength:
-      case ParameterName::kHeight: break;
-    }
+    if (names[i] == ParameterName::kTurn) out.example.parameters[i] *= -1.0;
   }
+  MeasureFootVectors(skeleton, names, out);
   return out;
 }
 

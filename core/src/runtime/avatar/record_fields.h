@@ -127,6 +127,7 @@ void PlanFields(Stream& stream, P& plan) {
     Vector(stream, trajectory.land_velocity_m_s);
     for (auto& height : trajectory.height_m) stream.F64(height);
     for (auto& turn : trajectory.turn_rad) stream.F64(turn);
+    for (auto& coefficient : trajectory.level_m) stream.F64(coefficient);
     for (auto& normal : trajectory.normals) {
       Vector(stream, normal);
       stream.CheckUnit(normal);

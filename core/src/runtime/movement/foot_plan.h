@@ -14,8 +14,9 @@ namespace stridewire {
 ///               then a cubic that continues with the same offset and velocity and ends at
 ///               t >= land: to - b(t)
 ///   heading:    locked while the sole is on the ground; with the heel up it follows the blend
-///   height:     values to add, eased from one to the next; the ball's height follows the blend,
-///               because locking it would bend knees by 25 degrees on captures
+///   height:     values to add, eased from one to the next, and `level_m`; otherwise the ball's
+///               height follows the blend, because locking it would bend knees by 25 degrees on
+///               captures
 struct FootTrajectory {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -34,6 +35,9 @@ struct FootTrajectory {
   // has faded, and from landing on.
   std::array<double, 3> height_m{};
   std::array<double, 3> turn_rad{};
+  /// Coefficients of u, u^2, u^3 and u^4 of a further height to add, where u is the elapsed
+  /// fraction of the movement. It keeps the sole of a step's supporting foot on the ground.
+  std::array<double, 4> level_m{};
   /// Ground normals at `from` and `to`.
   std::array<Vec3, 2> normals{Vec3(0.0f, 1.0f, 0.0f), Vec3(0.0f, 1.0f, 0.0f)};
   /// Additional heights early, in the middle and late in the swing, to clear the ground. Each is
@@ -64,7 +68,7 @@ struct FootResidual {
 /// A foot plan in the layout that the planting kernels read: groups of four floats, with positions
 /// relative to the base of the movement. Contains two trajectories and their common part
 /// (PackFootPlan).
-inline constexpr std::size_t kPackedTrajectoryFloats = 56;
+inline constexpr std::size_t kPackedTrajectoryFloats = 60;
 inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 12;
 using PackedFootPlan = std::array<float, kPackedPlanFloats>;
 

@@ -44,6 +44,15 @@ constexpr double kMaxRootSinkM = 0.3;
 // Largest sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
 
+// Standing soles may be this far above and below the ground, because captures do not tell exactly
+// where a foot ends. Beyond, the height of the foot is corrected, but by at most kMaxLevelM: larger
+// differences are not errors of the blend.
+constexpr double kMaxHoverM = 0.006;
+constexpr double kMaxSinkM = 0.003;
+constexpr double kMaxLevelM = 0.05;
+// A foot that leaves the ground this early in the blend-in of its movement is not corrected fully.
+constexpr double kLeastSettled = 0.3;
+
 // Sideways distance between the balls of the feet. A swinging foot that would pass the standing
 // foot closer than kPassApartM is pushed outward by up to kMaxPushM. This is checked while the feet
 // are within kPassingM of each other in the walking direction. A step that starts or lands closer
@@ -57,7 +66,7 @@ constexpr double kMaxPushM = 0.08;
 // Fractions of the swing and of the stance at which feet are sampled.
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
-constexpr std::array<double, 5> kStanceSamples{0.1, 0.3, 0.5, 0.7, 0.9};
+constexpr std::array<double, 5> kStanceSamples{0.0, 0.25, 0.5, 0.75, 1.0};
 
 // Returns the additional height of the ball's centre above the ground on a slope. The centre is at
 // a fixed distance from the ground plane, so the vertical distance grows with the slope.
@@ -75,6 +84,32 @@ double ValueOr(const MotionGroup& group, const ParameterValues& values, Paramete
                double otherwise) {
   const int l = group.FindParameter(name);
   return l < 0 ? otherwise : values.values[static_cast<std::size_t>(l)];
+}
+
+// A polynomial of degree 4 in the fraction of a movement.
+struct Quartic {
+  double constant;
+  std::array<double, 4> coefficients;  // Of u, u^2, u^3 and u^4.
+};
+
+// Returns the quartic that has these values at kStanceSamples, by Newton's forward differences.
+Quartic QuarticThrough(std::array<double, kStanceSamples.size()> values) {
+  const double constant = values[0];
+  std::array<double, 4> d{};
+  for (std::size_t order = 0; order < d.size(); ++order) {
+    for (std::size_t i = 0; i + order < d.size(); ++i) values[i] = values[i + 1] - values[i];
+    d[order] = values[0];
+  }
+  return {constant,
+          {4.0 * (d[0] - d[1] / 2.0 + d[2] / 3.0 - d[3] / 4.0),
+           16.0 * (d[1] / 2.0 - d[2] / 2.0 + 11.0 * d[3] / 24.0), 64.0 * (d[2] / 6.0 - d[3] / 4.0),
+           256.0 * d[3] / 24.0}};
+}
+
+// Returns by how much a sole has to be raised that is `above_m` above the ground.
+double Levelling(double above_m) {
+  const double excess_m = std::max(above_m - kMaxHoverM, 0.0) + std::min(above_m + kMaxSinkM, 0.0);
+  return std::clamp(-excess_m, -kMaxLevelM, kMaxLevelM);
 }
 
 constexpr std::size_t kMiddleLift = 1;
@@ -157,10 +192,8 @@ class Planner {
   // Chooses the base position so that, on average, the staying feet keep their positions.
   void SolveBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
-    std::array<double, 1 + kStanceSamples.size()> times_s{0.0};
-    for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
-      times_s[i + 1] = kStanceSamples[i] * stance_end_s;
-    }
+    std::array<double, kStanceSamples.size()> times_s;
+    for (std::size_t i = 0; i < times_s.size(); ++i) times_s[i] = kStanceSamples[i] * stance_end_s;
     sampler_.Sample(movement_, times_s, 0);
     DVec3 position(0.0);
     for (const Foot foot : staying) {
@@ -177,7 +210,21 @@ class Planner {
                         stands.z - start.z);
     }
     movement_.base.position_m = position / static_cast<double>(staying.size());
+    for (const Foot foot : staying) {
+      const auto f = static_cast<std::size_t>(foot);
+      const double ground_m =
+          locks[f].print.position_m.y + SlopeRise(rig_.sides[f], locks[f].normal);
+      std::array<double, kStanceSamples.size()> heights_m;
+      for (std::size_t i = 0; i < times_s.size(); ++i) {
+        heights_m[i] =
+            Levelling(movement_.base.position_m.y + sampler_.LowestSole(i, foot) - ground_m);
+      }
+      level_[f] = QuarticThrough(heights_m);
+    }
   }
+  // Returns heights that keep the sole of a staying foot on the ground during the movement. Valid
+  // after SolveBase.
+  const Quartic& Level(std::size_t foot) const { return level_[foot]; }
 
   // Chooses the footprint of a step's moving foot. Returns the foot at landing before planting.
   BlendedFoot ChooseLanding(const FootLocks& locks, const LandingTarget& target, Foot moving) {
@@ -231,10 +278,37 @@ class Planner {
     trajectory.to.heading_rad = landing_rad + turn_rad;
     trajectory.turn_rad[2] = turn_rad;
     if (target.terrain != nullptr) StandOnGround(moving, *target.terrain, trajectory);
-    trajectory.height_m[2] = trajectory.to.position_m.y - locks[x].print.position_m.y - rise_m +
-                             SlopeRise(rig_.sides[m], trajectory.normals[1]) -
-                             SlopeRise(rig_.sides[x], locks[x].normal);
+    const double ground_m =
+        locks[x].print.position_m.y + SlopeRise(rig_.sides[x], locks[x].normal) + rise_m;
+    trajectory.height_m[2] = trajectory.to.position_m.y +
+                             SlopeRise(rig_.sides[m], trajectory.normals[1]) - ground_m +
+                             EndLevelling(ground_m)[m];
     return landing;
+  }
+
+  // Returns by how much the soles of the blended pose have to be raised at the end of the movement,
+  // [foot], so that they stand on ground at height `ground_m`. Blends of steps that differ a lot
+  // would otherwise end with a foot above or below the ground.
+  std::array<double, 2> EndLevelling(double ground_m) const {
+    std::array<double, 2> raise_m{};
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      raise_m[static_cast<std::size_t>(foot)] =
+          Levelling(sampler_.LowestSole(kBlendedEnd, foot) - ground_m);
+    }
+    return raise_m;
+  }
+
+  // Returns the height to add to the moving foot of a step from the end of the blend-in until it
+  // leaves the ground, so that its sole stays on the ground at height `ground_m`. `start_m` is the
+  // height at the start, `settled_m` the height without levelling.
+  double ReleaseHeight(Foot moving, double ground_m, double start_m, double settled_m) const {
+    const double since_s = times_s_[kRelease] - movement_.start_offset_s;
+    const double settled = 1.0 - EaseOut(since_s / movement_.ease_out_s);
+    const double height_m = start_m + settled * (settled_m - start_m);
+    const double raise_m = Levelling(sampler_.LowestSole(kRelease, moving) + height_m - ground_m);
+    // A foot that stands for longer reaches this height before it rolls up: meet halfway.
+    if (raise_m < 0.0 && since_s > movement_.ease_out_s) return settled_m + 0.5 * raise_m;
+    return settled_m + raise_m / std::max(settled, kLeastSettled);
   }
 
   // Returns the positions where the feet of a jump land, [foot].
@@ -401,6 +475,7 @@ class Planner {
   PoseSpan pose_;
   Movement& movement_;
   FootSampler sampler_;
+  std::array<Quartic, 2> level_{};  // [foot]
 
   // Indices of the times that SampleKeyPoses samples. kRelease and kLanding each have one time
   // before and one after them, for velocities.
@@ -539,7 +614,16 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     const double sink_m = previous[f].ball_m.y - start[f].ball_m.y;
     const double turn_rad = WrapAngle(previous[f].heading_rad - start[f].heading_rad);
     const bool stays_down = is_step && f == x;
-    trajectory.height_m = {lock.height_m, stays_down ? 0.0 : lock.height_m + sink_m, 0.0};
+    trajectory.height_m = {lock.height_m, lock.height_m + sink_m, 0.0};
+    if (stays_down) {
+      trajectory.height_m[1] = planner.Level(f).constant;
+      trajectory.level_m = planner.Level(f).coefficients;
+    } else if (is_step) {
+      const double ground_m =
+          lock.print.position_m.y + SlopeRise(library.leg_rig().sides[f], lock.normal);
+      trajectory.height_m[1] =
+          planner.ReleaseHeight(moving, ground_m, lock.height_m, trajectory.height_m[1]);
+    }
     trajectory.turn_rad = {lock.turn_rad, lock.turn_rad + turn_rad, lock.turn_rad + turn_rad};
     trajectory.height_m[2] = trajectory.height_m[1];
     trajectory.root_weight = is_step ? (f == x ? 1.0 : 0.0) : 0.5;
@@ -587,13 +671,14 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   std::array<DVec3, 2> to_m = decision.to_m;
   if (target != nullptr) to_m = planner.ChooseJumpLanding(locks, target->request);
   const FeetAt landing = planner.Landing();
+  const std::array<double, 2> raise_m = planner.EndLevelling(0.5 * (to_m[0].y + to_m[1].y));
   for (const Foot foot : kBoth) {
     const auto f = static_cast<std::size_t>(foot);
     FootTrajectory& trajectory = plan.feet[f];
     trajectory.to.position_m = to_m[f];
     trajectory.to.heading_rad = landing[f].heading_rad;
     trajectory.turn_rad[2] = 0.0;
-    trajectory.height_m[2] = 0.0;
+    trajectory.height_m[2] = raise_m[f];
     planner.BlendSwing(foot, landing[f], trajectory);
   }
   return planner.Entry();

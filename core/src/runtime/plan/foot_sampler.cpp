@@ -149,7 +149,9 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
       .is_eased = lanes.samples.is_eased,
       .is_inertial = lanes.is_inertial};
   if (!kernels::FinishPoses(blend, roots_m_[0], lanes.rotations)) return false;
-  kernels::ComputeFeet(rig, lanes.rotations, times_s.size(), balls_m_[0][0], ankles_m_[0][0]);
+  kernels::ComputeFeet(
+      rig, lanes.rotations, times_s.size(),
+      {.balls_m = balls_m_[0][0], .ankles_m = ankles_m_[0][0], .toe_tips_m = toe_tips_m_[0][0]});
   return true;
 }
 
@@ -168,6 +170,7 @@ void FootSampler::SampleOne(const Movement& movement, double time_s, bool is_eas
     EvaluateLeg(library_.skeleton(), rig, pose_, foot, leg);
     put(leg.ball_m, balls_m_[f]);
     put(leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)], ankles_m_[f]);
+    put(leg.toe_tip_m, toe_tips_m_[f]);
   }
 }
 
@@ -175,13 +178,22 @@ DVec3 FootSampler::Ball(std::size_t i, Foot foot) const {
   return DVec3(At(roots_m_, i)) + DVec3(At(balls_m_[static_cast<std::size_t>(foot)], i));
 }
 
-BlendedFoot FootSampler::FootAt(std::size_t i, Foot foot) const {
+LegPose FootSampler::LegAt(std::size_t i, Foot foot) const {
   const auto f = static_cast<std::size_t>(foot);
   LegPose leg;
   leg.ball_m = At(balls_m_[f], i);
+  leg.toe_tip_m = At(toe_tips_m_[f], i);
   leg.positions_m[static_cast<std::size_t>(library_.leg_rig().side(foot).ankle)] =
       At(ankles_m_[f], i);
-  return FootOf(library_.leg_rig(), foot, DVec3(At(roots_m_, i)), leg);
+  return leg;
+}
+
+BlendedFoot FootSampler::FootAt(std::size_t i, Foot foot) const {
+  return FootOf(library_.leg_rig(), foot, DVec3(At(roots_m_, i)), LegAt(i, foot));
+}
+
+double FootSampler::LowestSole(std::size_t i, Foot foot) const {
+  return roots_m_[1][i] + LegAt(i, foot).LowestSole(library_.leg_rig().side(foot));
 }
 
 }  // namespace stridewire

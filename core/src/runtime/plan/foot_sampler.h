@@ -34,10 +34,14 @@ class FootSampler {
   [[nodiscard]] DVec3 Ball(std::size_t i, Foot foot) const;
   /// Returns a foot at the `i`th time.
   [[nodiscard]] BlendedFoot FootAt(std::size_t i, Foot foot) const;
+  /// Returns the height of a foot at the `i`th time, in world space (LegPose::LowestSole).
+  [[nodiscard]] double LowestSole(std::size_t i, Foot foot) const;
 
  private:
   [[nodiscard]] bool SampleTogether(const Movement& movement, std::span<const double> times_s,
                                     std::size_t eased);
+  // Returns a leg with the positions of ankle, ball and tip of the toes only.
+  [[nodiscard]] LegPose LegAt(std::size_t i, Foot foot) const;
   void SampleOne(const Movement& movement, double time_s, bool is_eased, std::size_t i);
   [[nodiscard]] Vec3 At(const float (&of)[3][kMaxTimes], std::size_t i) const {
     return {of[0][i], of[1][i], of[2][i]};
@@ -46,9 +50,10 @@ class FootSampler {
   const MotionLibrary& library_;
   FootPlanScratch& scratch_;
   PoseSpan pose_;
-  alignas(64) float roots_m_[3][kMaxTimes];      // Positions of the root in world space.
-  alignas(64) float balls_m_[2][3][kMaxTimes];   // [foot]: balls relative to the root.
-  alignas(64) float ankles_m_[2][3][kMaxTimes];  // [foot]: ankles relative to the root.
+  alignas(64) float roots_m_[3][kMaxTimes];        // Positions of the root in world space.
+  alignas(64) float balls_m_[2][3][kMaxTimes];     // [foot]: balls relative to the root.
+  alignas(64) float ankles_m_[2][3][kMaxTimes];    // [foot]: ankles relative to the root.
+  alignas(64) float toe_tips_m_[2][3][kMaxTimes];  // [foot]: tips of the toes, likewise.
 };
 
 }  // namespace stridewire

@@ -14,7 +14,7 @@
 template <typename Number, typename Vector>
 struct TrajectoryOf {
   Vector from, to, release_offset, release_velocity, land_offset, land_velocity, aside;
-  Number height[3], turn[3];
+  Number height[3], turn[3], level[4];
   Vector residual_offset, residual_velocity, root_shift;
   Number from_heading, to_heading, release_turn, root_weight, residual_turn, residual_turn_s;
   Number lift[3];
@@ -78,7 +78,10 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   const Number rise = height[2] - height[1];
   const Number rise_start = Select(rise > zero, zero, Constant<Number>(kSinkStart));
   const Number risen = one - EaseOut(DivideBy(s - rise_start, 1.0 - kSinkStart));
+  const auto& level = trajectory.level;
+  const Number u = timing.OfDuration(t);
   c.offset.y = height[0] + settled * (height[1] - height[0]) + rise * risen +
+               u * (level[0] + u * (level[1] + u * (level[2] + u * level[3]))) +
                trajectory.lift[0] * LiftShareOf(kLiftCurves[0], s) +
                trajectory.lift[1] * LiftShareOf(kLiftCurves[1], s) +
                trajectory.lift[2] * LiftShareOf(kLiftCurves[2], s);

@@ -86,6 +86,8 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   t.residual_offset = XyzOf(q), t.lift[2] = q.w;
   t.residual_velocity = XyzOf(next());
   t.root_shift = XyzOf(next());
+  q = next();
+  t.level[0] = q.x, t.level[1] = q.y, t.level[2] = q.z, t.level[3] = q.w;
   return t;
 }
 
@@ -146,8 +148,13 @@ HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, SoaQuat 
   });
 }
 
-void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
-                 float* ankles_m) {
+HWY_INLINE SoaVec3 ToeTipOf(const SoaLeg& leg, const LegRig::Bones& bones) {
+  const std::size_t last = bones.count - 1;
+  return leg.positions[last] + Rotate(leg.rotations[last], Broadcast(bones.toe_tip_m));
+}
+
+void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes,
+                 const FeetPositions& feet) {
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
     SoaLeg legs[2];
     EvaluateLegs(rig, rotations + lane, LoadQuat(rotations + lane), legs,
@@ -158,8 +165,10 @@ void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes, f
         StoreLanes(v.y, to + kBlock);
         StoreLanes(v.z, to + 2 * kBlock);
       };
-      put(legs[f].ball, balls_m + f * 3 * kBlock + lane);
-      put(legs[f].positions[bones.ankle], ankles_m + f * 3 * kBlock + lane);
+      const std::size_t at = f * 3 * kBlock + lane;
+      put(legs[f].ball, feet.balls_m + at);
+      put(legs[f].positions[bones.ankle], feet.ankles_m + at);
+      put(ToeTipOf(legs[f], bones), feet.toe_tips_m + at);
     });
   }
 }
@@ -204,9 +213,7 @@ HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& 
         print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) * per_rise;
     return ground + Float(rest_m) * per_rise - at.y;
   };
-  const std::size_t last = bones.count - 1;
-  const SoaVec3 toe_tip =
-      leg.positions[last] + Rotate(leg.rotations[last], Broadcast(bones.toe_tip_m));
+  const SoaVec3 toe_tip = ToeTipOf(leg, bones);
   const SoaVec3 heel =
       leg.positions[bones.ankle] + Rotate(leg.rotations[bones.ankle], Broadcast(bones.heel_m));
   const Float depth =

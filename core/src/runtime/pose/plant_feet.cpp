@@ -60,6 +60,7 @@ TrajectoryOf<double, DVec3> TrajectoryFor(const FootPlan& plan, Foot foot) {
           .aside = from.aside_m,
           .height = {height[0], height[1], height[2]},
           .turn = {turn[0], turn[1], turn[2]},
+          .level = {from.level_m[0], from.level_m[1], from.level_m[2], from.level_m[3]},
           .residual_offset = residual.offset_m,
           .residual_velocity = residual.offset_m_s,
           .root_shift = from.root_shift_m,
@@ -247,6 +248,8 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     add(residual.offset_m, trajectory.lift_m[2]);
     add(residual.offset_m_s, 0.0);
     add(trajectory.root_shift_m, 0.0);
+    const auto& level_m = trajectory.level_m;
+    add({level_m[0], level_m[1], level_m[2]}, level_m[3]);
   }
   add(plan.root_residual_m, movement.extra_turn_rad);
   add(plan.root_residual_m_s, movement.duration_s());

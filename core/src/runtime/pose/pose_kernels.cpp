@@ -329,9 +329,9 @@ bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
   return HWY_DYNAMIC_DISPATCH(FinishPoses)(blend, root_m, rotations);
 }
 
-void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
-                 float* ankles_m) {
-  HWY_DYNAMIC_DISPATCH(ComputeFeet)(rig, rotations, lanes, balls_m, ankles_m);
+void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes,
+                 const FeetPositions& feet) {
+  HWY_DYNAMIC_DISPATCH(ComputeFeet)(rig, rotations, lanes, feet);
 }
 
 void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count) {

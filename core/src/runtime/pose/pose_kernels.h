@@ -140,11 +140,17 @@ struct FinishPosesJob {
 /// rotation in a row of some lane may be shorter than kSmallestNorm (see BlendRotations).
 [[nodiscard]] bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations);
 
-/// Computes the balls and ankles of both legs, relative to the root and in world axes, each
-/// [foot][x y z][kBlock]. `rotations` has the layout that FinishPoses writes, but only for the
-/// joints in LegRig::joints. `rig` must be usable.
-void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
-                 float* ankles_m);
+/// Positions of both feet, relative to the root and in world axes, each [foot][x y z][kBlock].
+struct FeetPositions {
+  float* balls_m;
+  float* ankles_m;
+  float* toe_tips_m;
+};
+
+/// Computes the positions of the feet. `rotations` has the layout that FinishPoses writes, but only
+/// for the joints in LegRig::joints. `rig` must be usable.
+void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes,
+                 const FeetPositions& feet);
 
 /// A block of poses to plant in place.
 struct PlantPosesJob {

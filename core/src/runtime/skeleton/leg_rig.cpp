@@ -100,6 +100,7 @@ LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
     side.shank_m = glm::length(at(side.ankle) - at(side.knee));
 
     side.ball_height_m = static_cast<double>(stand_pose.root_position_m.y) + pose.ball_m.y;
+    side.ankle_height_m = static_cast<double>(stand_pose.root_position_m.y) + at(side.ankle).y;
     side.toe_out_rad = pose.FootHeading(side);
     const Vec3 sole = pose.ball_m - at(side.ankle);
     side.foot_m = std::sqrt(static_cast<double>(sole.x) * sole.x + sole.z * sole.z);
@@ -138,6 +139,15 @@ double LegPose::Flatness(const LegRig::Side& side) const {
   if (side.foot_m < kSmallestBoneM) return 0.0;
   const Vec3 foot = ball_m - positions_m[static_cast<std::size_t>(side.ankle)];
   return std::sqrt(static_cast<double>(foot.x) * foot.x + foot.z * foot.z) / side.foot_m;
+}
+
+// Toes give way by this much before they lift the foot.
+constexpr double kSoftToeM = 0.005;
+
+double LegPose::LowestSole(const LegRig::Side& side) const {
+  const double ankle_m = positions_m[static_cast<std::size_t>(side.ankle)].y;
+  return std::min({ball_m.y - side.ball_height_m, ankle_m - side.ankle_height_m,
+                   toe_tip_m.y - side.toe_height_m + kSoftToeM});
 }
 
 void EvaluateLeg(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, Foot foot,

@@ -24,6 +24,7 @@ struct LegRig {
     Vec3 hinge = Vec3(0.0f);
     /// Height of the ball's centre above the ground in the stand pose.
     double ball_height_m = 0.0;
+    double ankle_height_m = 0.0;  ///< Height of the ankle above the ground in the stand pose.
     /// Direction from ankle to ball in the stand pose, relative to its heading.
     double toe_out_rad = 0.0;
     /// Height of the tip of the toes above the ground in the stand pose.
@@ -91,6 +92,12 @@ struct LegPose {
   /// Returns the horizontal fraction of the foot's length: 1 with the sole on the ground as in the
   /// stand pose, less with the heel up, and 0 if the ball is at the ankle.
   [[nodiscard]] double Flatness(const LegRig::Side& side) const;
+  /// Returns the height of the foot relative to the root, minus its height above the ground in the
+  /// stand pose, at that point of ankle, ball and tip of the toes where the difference is smallest.
+  /// The tip of the toes may be a little lower.
+  /// If the root is at height y, a foot that stands on level ground at height g has
+  /// y + LowestSole = g, also while it rolls over the heel or the toes.
+  [[nodiscard]] double LowestSole(const LegRig::Side& side) const;
 };
 
 void EvaluateLeg(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, Foot foot,

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "offline/extract/assemble.h"
 #include "offline/extract/extract.h"
 #include "stridewire/runtime/pose.h"
 #include "synthetic_walker.h"
@@ -63,6 +64,36 @@ TEST(ExtractGround, FindsAllStepsOnAnInclinedFloor) {
       EXPECT_NEAR(SoleHeight(found, step.example, OtherFoot(MovingFoot(step.kind))), 0.0, 0.006);
     }
     EXPECT_NEAR(found.ball_height_m[0] - found.ball_height_m[1], 0.0, 0.003);
+  }
+}
+
+// The floor rises under the walker, but the examples of a library stand on level ground.
+TEST(ExtractGround, ExamplesOfAnInclinedFloorStandOnLevelGround) {
+  SyntheticWalker walker;
+  walker.slope = 0.03;
+  std::vector<WalkerStep> steps;
+  for (int i = 0; i < 20; ++i) steps.push_back({i % 2 == 0 ? Foot::kLeft : Foot::kRight, 0.5});
+  for (const bool mirror : {false, true}) {
+    SCOPED_TRACE(mirror);
+    LibraryAssembler assembler({.mirror = mirror});
+    const Extraction& found = assembler.Add(walker.Walk(steps));
+    const auto sole = [&](const RawExample& example, int frame, Foot foot) {
+      return BallPosition(found.skeleton, example.clip.frame(frame), foot).y -
+             found.ball_height_m[static_cast<int>(foot)];
+    };
+    const auto library = assembler.Assemble();
+    ASSERT_TRUE(library.has_value()) << library.error().text;
+    int examples = 0;
+    for (const RawGroup& group : library->groups) {
+      for (const RawExample& example : group.examples) {
+        ++examples;
+        for (const int frame : {0, example.clip.frame_count() - 1}) {
+          EXPECT_NEAR(sole(example, frame, Foot::kLeft), sole(example, frame, Foot::kRight), 0.006)
+              << example.source << ", frame " << frame;
+        }
+      }
+    }
+    EXPECT_GE(examples, mirror ? 40 : 20);
   }
 }
 

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+
+#include "offline/extract/extract.h"
+#include "runtime/skeleton/leg_rig.h"
+#include "stridewire/runtime/pose.h"
+
+namespace stridewire {
+
+/// Puts the feet of examples on level ground.
+///
+/// The floor of a recording is never level: markers, tilted floors and drifting sensors move the
+/// ground under successive contacts by a centimetre or two, and the feet of blends would hover or
+/// sink by as much. Each foot is moved up or down by the error of the contact it is in. The error
+/// changes during the swing. The root follows the feet in proportion to the weight that they carry,
+/// and the legs bend for the rest.
+class FeetLeveller {
+ public:
+  /// `ball_height_m` [foot]: height at which the balls of standing feet rest. `hinges` [foot]: see
+  /// LegRig::Side::hinge. Does nothing but shift the root if planting does not support the legs.
+  FeetLeveller(const Skeleton& skeleton, ConstPoseSpan any_pose, const std::array<Vec3, 2>& hinges,
+               const std::array<double, 2>& ball_height_m);
+
+  /// Levels a step or a jump by its `ground_m`, and measures the parameters of a step again.
+  /// `names` are their names.
+  void Level(ExtractedExample& example, std::span<const ParameterName> names) const;
+
+  /// Puts both balls of a standing pose at rest. Leaves the pose unchanged if a foot is too far
+  /// from the ground to stand on it.
+  void Level(PoseSpan stand) const;
+
+ private:
+  // Raises the balls by `feet_m` [foot] and the root by `root_m`.
+  void Raise(const std::array<double, 2>& feet_m, double root_m, PoseSpan pose) const;
+
+  const Skeleton& skeleton_;
+  std::array<double, 2> ball_height_m_;
+  LegRig rig_;
+};
+
+}  // namespace stridewire
