@@ -50,6 +50,8 @@ constexpr double kMaxAsideM = 0.05;
 constexpr double kMaxHoverM = 0.006;
 constexpr double kMaxSinkM = 0.003;
 constexpr double kMaxLevelM = 0.05;
+// On level ground, a swinging foot stays at least this far above it.
+constexpr double kLevelClearanceM = 0.012;
 // A foot that leaves the ground this early in the blend-in of its movement is not corrected fully.
 constexpr double kLeastSettled = 0.3;
 
@@ -337,6 +339,25 @@ class Planner {
     trajectory.release_turn_rad = at_release.turn_rad - at_release.free_turn_rad;
     trajectory.land_velocity_m_s = -velocity_around(kLanding);
     trajectory.land_offset_m = trajectory.to.position_m - landing.ball_m;
+  }
+
+  // Returns the lift in the middle of the swing (FootTrajectory::lift_m) that the moving foot of a
+  // step without terrain needs to stay above the ground between its footprints.
+  double LevelLift(Foot moving) {
+    const FootTrajectory& trajectory = movement_.feet.foot(moving);
+    double lift_m = 0.0;
+    for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
+      const double part = kSwingSamples[i];
+      const BlendedFoot blended{.ball_m = sampler_.Ball(kSwing + i, moving)};
+      const FootCorrection correction =
+          CorrectFoot(movement_, moving, times_s_[kSwing + i], blended);
+      const double from_m = trajectory.from.position_m.y;
+      const double ground_m = from_m + part * (trajectory.to.position_m.y - from_m);
+      const double clearance_m =
+          sampler_.LowestSole(kSwing + i, moving) + correction.offset_m.y - ground_m;
+      lift_m = std::max(lift_m, (kLevelClearanceM - clearance_m) / LiftShare(kMiddleLift, part));
+    }
+    return std::min(lift_m, kMaxLiftM);
   }
 
   // Returns the outward push that the swinging foot needs to pass the standing leg.
@@ -648,8 +669,9 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
       landing = planner.ChooseLanding(locks, *target, moving);
     }
     planner.BlendSwing(moving, landing, trajectory);
+    if (!plan.keeps_above_ground) trajectory.lift_m[kMiddleLift] = planner.LevelLift(moving);
     if (target == nullptr) {
-      trajectory.lift_m = decision.lift_m;
+      if (plan.keeps_above_ground) trajectory.lift_m = decision.lift_m;
       trajectory.aside_m = decision.aside_m;
       trajectory.root_shift_m = decision.root_shift_m;
       return planner.Entry();
