@@ -18,9 +18,9 @@ constexpr double kMinLengthM = 0.25;
 constexpr double kMaxRiseM = 0.06;
 constexpr double kMaxTurnRad = 0.2;
 constexpr double kMaxWidthM = 0.4;
-// The ball of the foot rises by about 0.1 m in a walk. It rises further in steps over or onto
+// The ball of the foot rises by 0.02 to 0.09 m in a walk. It rises further in steps over or onto
 // things.
-constexpr double kPlainLiftM = 0.14;
+constexpr double kPlainLiftM = 0.11;
 // Strides whose length differs from the median by more than this are not averaged.
 constexpr double kSameLengthM = 0.12;
 // Half width of the window that smooths a single stride.
