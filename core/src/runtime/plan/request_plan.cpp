@@ -26,8 +26,7 @@ constexpr double kCostPerParameterM = 1e-3;
 constexpr double kFootPreferenceM = 0.01;
 
 // Extra cost of a group with turn, side or height parameters for a step that requests none of them.
-// Such parameters take arbitrary values and would bend a straight walk. Completed groups cost as
-// much, so that they do not replace captured steps.
+// Such parameters take arbitrary values and would bend a straight walk.
 constexpr double kStraightPreferenceM = 0.15;
 // Extra cost of a group whose steps were generated because the captures lack them. Captured steps
 // are preferred if they fit nearly as well.
@@ -207,9 +206,7 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
     const MotionGroup& group = library.groups()[g];
     if (group.kind != kind) continue;
     double group_cost_m = kCostPerParameterM * group.parameter_count();
-    if (is_straight && (IsGeneral(group) || group.is_completed)) {
-      group_cost_m += kStraightPreferenceM;
-    }
+    if (is_straight && IsGeneral(group)) group_cost_m += kStraightPreferenceM;
     if (group.is_completed) group_cost_m += kCompletedCostM;
     const auto plan = PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m,
                                   best_cost_m, is_completed_library);
