@@ -126,7 +126,8 @@ void AvatarBody::ContinueFeet(bool keeps_speed, const std::array<FeetAt, 2>& ble
     planned[1] = planned[0];
     earlier_feet[1] = earlier_feet[0];
   }
-  ContinueFrom(earlier_feet, planned, movement);
+  ContinueFrom(earlier_feet, planned, keeps_speed ? blended : std::array{blended[0], blended[0]},
+               movement);
 }
 
 void AvatarBody::ApplyLayers() {

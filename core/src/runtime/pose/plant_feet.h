@@ -58,10 +58,12 @@ struct FeetCorrection {
 
 /// Sets the residuals of a movement's plan so that the corrections continue smoothly. `before` are
 /// the corrections of the previous movement at the start of this one and kBlendStepS earlier.
-/// `planned` are those of the plan at the start and kBlendStepS later. Two equal elements stand for
-/// zero velocity.
+/// `planned` are those of the plan at the start and kBlendStepS later, and `blended` the feet
+/// without corrections at those times. Two equal elements stand for zero velocity. The descent of a
+/// foot that has just landed is stopped.
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
-                  const std::array<FeetCorrection, 2>& planned, Movement& movement);
+                  const std::array<FeetCorrection, 2>& planned,
+                  const std::array<FeetAt, 2>& blended, Movement& movement);
 
 /// Starts a plant fade in a planned movement. `displayed` is the pose at its start, without planted
 /// feet, and also the blended pose of that time. `pose` is scratch of the same size.
