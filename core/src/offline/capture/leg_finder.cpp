@@ -187,7 +187,8 @@ Expected<FoundLegs> FindLegsByShape(const FigureShape& figure) {
     }
     if (HasNameOutsideLegs(figure, pair)) continue;
     std::optional<DVec3> direction = CarryingDirection(figure, PosesOf(figure), pair);
-    // In the motion the figure may hang by its arms.
+    // If the legs do not carry the figure in the motion, for example because it hangs by its arms,
+    // the rest pose decides.
     if (!direction) direction = CarryingDirection(figure, std::span(&figure.rest, 1), pair);
     if (!direction) continue;
     best = &pair;

@@ -10,8 +10,8 @@ namespace stridewire {
 /// captured walks. For example, a maximum speed of 0.35 instead of 0.8 m/s loses half of the steps.
 struct ContactOptions {
   double speed_max_m_s = 0.8;  ///< A point stands only if it is slower than this.
-  /// A point stands only if it is at most this far above the height at which it rests then and
-  /// there.
+  /// A point stands only if it is at most this far above the height at which it rests during that
+  /// contact.
   double height_max_m = 0.06;
   double smooth_s = 0.04;
   double gap_min_s = 0.05;      ///< Gaps between contacts that are shorter than this are filled.

@@ -31,8 +31,8 @@ constexpr double kHeldMinS = 0.1;  // In shorter flights, the acceleration of th
 // If the feet are closer than this, the pelvis does not indicate which one carries the weight.
 constexpr double kFeetApartMinM = 0.3;
 
-// Returns the mean vertical acceleration of the pelvis over some frames, from the second difference
-// of the mean heights of thirds.
+// Returns the mean vertical acceleration of the pelvis over a range of frames. It follows from the
+// mean heights in the three thirds of the range, whose second difference is less noisy.
 double VerticalAcceleration(const BodyTracks& tracks, const FrameRange& range) {
   const int third = std::max(1, range.size() / 3);
   if (range.size() < 3 * third) return 0.0;
