@@ -22,8 +22,6 @@ constexpr std::size_t kEventReserve = 7;
 constexpr std::size_t kUsualEvents = 3;
 // A queue keeps memory for this many requests.
 constexpr std::size_t kUsualQueue = 8;
-// Steps of walks that turn by more than this are played fast, as people turn.
-constexpr double kHurriedTurnRad = 0.25;
 // Phase at which a jump starts if it interrupts another movement. In between, the blend from the
 // previous pose replaces the start of the crouch.
 constexpr double kJumpStartPhase = 0.25;
@@ -392,9 +390,7 @@ WalkDecision AvatarSimulation::PlanNextWalkStep(WalkProgress& progress) const {
 void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
   const WalkDecision decision = PlanNextWalkStep(walk_);
   if (decision.outcome == WalkOutcome::kStep) {
-    RequestPlan plan = decision.plan;
-    if (std::fabs(plan.turn_rad.value_or(0.0)) > kHurriedTurnRad) plan.max_rate = kHurriedRate;
-    StartPlan(plan, queue_[queue_head_].id, scratch);
+    StartPlan(decision.plan, queue_[queue_head_].id, scratch);
     return;
   }
   const std::uint64_t id = PopQueue();

@@ -42,6 +42,10 @@ constexpr double kSlack = 1.05;
 // A step that goes no further forward than this ends with the body above both feet.
 constexpr double kForwardM = 0.2;
 
+// Steps that go less far forward than this, or turn by more, are played fast.
+constexpr double kStrideM = 0.35;
+constexpr double kHurriedTurnRad = 0.25;
+
 // Limits on the ground below a sole (FootSupport). They exclude edges, bumps and walls.
 constexpr double kLeastCarried = 0.999;
 constexpr double kDeepestGapM = 0.04;
@@ -320,6 +324,10 @@ class StepPlanner {
       return std::nullopt;
     }
     plan->max_extra_turn_rad = kMaxWalkTurnRad;
+    // Short and turning steps are the slowest of most libraries, but people take them quickly.
+    if (wanted.z < kStrideM || std::fabs(wanted_rad) > kHurriedTurnRad) {
+      plan->max_rate = kHurriedRate;
+    }
     plan->most_residual_m = reach * kMaxPlantedErrorM;
     if (!strides || step.is_last) plan->root_m = step.root_m;
     return PlannedStep{.plan = *plan,

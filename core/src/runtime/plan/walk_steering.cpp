@@ -39,14 +39,21 @@ constexpr double kNearM = 0.5;
 constexpr double kSideEffort = 1.5;
 
 // Goals further away than this are reached by walking, not by stepping sideways or backward.
-constexpr double kMaxShiftM = 1.3;
+// Libraries without steps backward of at least kBackM have to combine other steps.
+constexpr double kMaxShiftM = 2.0;
+constexpr double kMaxShiftWithoutBackM = 1.3;
+constexpr double kBackM = 0.2;
 // Goals closer than this are reached without turning towards them first.
 constexpr double kShuffleM = 0.15;
-constexpr double kSideStepM = 0.28;
+constexpr double kSideStepM = 0.32;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
-// A library that only has strides steps sideways if that saves more than this many steps.
-constexpr double kStrideMargin = 0.5;
+// Expected duration of a stride, to compare ways of reaching a goal. Steps that turn on the spot or
+// go sideways or backward are played fast (RequestPlan::max_rate) and take kQuickStepS.
+constexpr double kStrideS = 0.62;
+// A library that only has strides, or no steps backward, steps sideways if that saves more than
+// this time.
+constexpr double kStrideMarginS = 0.3;
 
 // An avatar that faces away from its path by more than this turns on the spot first.
 constexpr double kSlowTurnRad = 0.7;
@@ -233,30 +240,31 @@ double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const 
   return HeadingTo(way - RotateYaw(approach_.heading_rad, DVec3(0.0, 0.0, curve_m)));
 }
 
-// Returns true if stepping sideways or backward, or turning on the spot, takes no more steps than
-// walking.
+// Returns true if stepping sideways or backward, or turning on the spot, is expected to take no
+// longer than walking.
 bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   if (!is_last_leg) return false;
   const DVec3 way = approach_.position_m - body.position_m;
   const double remaining_m = Length(way);
-  if (remaining_m > kMaxShiftM) return false;
+  if (remaining_m > (profile_.back_m >= kBackM ? kMaxShiftM : kMaxShiftWithoutBackM)) return false;
   if (remaining_m < kShuffleM) return true;
-  const auto turning_steps = [](double turn_rad, double free_rad) {
-    return 2.0 * std::max(0.0, std::fabs(turn_rad) - free_rad) /
+  const auto turning_s = [](double turn_rad, double free_rad) {
+    return kQuickStepS * 2.0 * std::max(0.0, std::fabs(turn_rad) - free_rad) /
            (kSpotTurn.out_rad + kSpotTurn.in_rad);
   };
   const double way_rad = HeadingTo(way);
-  const double walking =
-      turning_steps(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
-      remaining_m / StepM() + 1.0 +
-      turning_steps(WrapAngle(approach_.heading_rad - way_rad), kSpotTurn.out_rad);
+  const double walking_s = turning_s(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
+                           kStrideS * remaining_m / StepM() + kQuickStepS +
+                           turning_s(WrapAngle(approach_.heading_rad - way_rad), kSpotTurn.out_rad);
   const DVec3 local = RotateYaw(-body.heading_rad, way);
   const double ahead_m = local.z >= 0.0 ? StepM() : std::max(profile_.back_m, kLeastBackM);
-  const double shifting =
-      1.0 + std::max({std::fabs(local.z) / ahead_m, 2.0 * std::fabs(local.x) / kSideStepM,
-                      turning_steps(WrapAngle(approach_.heading_rad - body.heading_rad), 0.0)});
-  // Side steps are short, so a library that only has strides avoids them.
-  return shifting <= walking - (profile_.shortest_m > kShortestStepM ? kStrideMargin : 0.0);
+  const double shifting_s =
+      kQuickStepS + std::max({kQuickStepS * std::fabs(local.z) / ahead_m,
+                              kQuickStepS * 2.0 * std::fabs(local.x) / kSideStepM,
+                              turning_s(WrapAngle(approach_.heading_rad - body.heading_rad), 0.0)});
+  // Such libraries often do not have the side steps, which are short, either.
+  const bool may_lack_steps = profile_.shortest_m > kShortestStepM || profile_.back_m < kBackM;
+  return shifting_s <= walking_s - (may_lack_steps ? kStrideMarginS : 0.0);
 }
 
 // If the avatar does not walk and its feet are apart along the way, prefers the foot behind and
