@@ -280,13 +280,27 @@ TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
 // changes, and the protocol needs a new version. Otherwise clients that evaluate
 // movements with the old formulas would display other poses than the server (decision 0021).
 TEST(Evaluation, MatchesTheProtocolVersion) {
-  DrawnCrowd crowd(LibraryOf({}), 24, 10);
+  DrawnCrowd crowd(LibraryOf({}), 24, 10, /*idle_motion=*/false);
   std::string bytes;
   for (int tick = 0; tick < 300; ++tick) {
     crowd.Advance();
     for (const AvatarSimulation& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
   }
   EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0xa0d99ff438b6fbccu);
+  EXPECT_EQ(protocol::kProtocolVersion, 1u);
+}
+
+// The same for standing avatars, whose motion is generated when a library is opened.
+TEST(Evaluation, IdleMotionMatchesTheProtocolVersion) {
+  std::string bytes;
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
+    AvatarSimulation avatar(LibraryOf({}), {}, {.idle_seed = seed});
+    for (int tick = 0; tick < 600; ++tick) {
+      avatar.Advance(1.0 / 60.0);
+      AppendBytes(avatar, bytes);
+    }
+  }
+  EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0x56dd074939c8eacau);
   EXPECT_EQ(protocol::kProtocolVersion, 1u);
 }
 
@@ -313,7 +327,7 @@ TEST_P(LibraryEvaluation, MatchesTheReference) {
   for (int tick = 0; tick < 600; ++tick) {
     crowd.Advance();
     for (const AvatarSimulation& avatar : crowd.avatars()) {
-      const Movement* movement = avatar.movement();
+      const Movement* movement = avatar.displayed_movement();
       if (movement == nullptr) continue;
       const MotionGroup& group = library_->group(movement->group);
       cache.Clear();
@@ -354,7 +368,7 @@ TEST_P(LibraryEvaluation, PlantingMatchesTheReference) {
   for (int tick = 0; tick < 900; ++tick) {
     crowd.Advance();
     for (const AvatarSimulation& avatar : crowd.avatars()) {
-      const Movement* movement = avatar.movement();
+      const Movement* movement = avatar.displayed_movement();
       if (movement == nullptr) continue;
       if (!movement->feet.is_active) continue;
       const MotionGroup& group = library_->group(movement->group);

@@ -63,7 +63,7 @@ struct Walk {
   int steps = 0;
   double away_m = 0.0;  // Distance of the base from the goal.
   double away_rad = 0.0;
-  double root_m = 0.0;  // Distance of the displayed root from the goal.
+  double root_m = 0.0;  // Distance of the displayed root from the goal, at rest.
   double path_m = 0.0;  // Length of the path of the base.
 };
 
@@ -89,6 +89,8 @@ Walk GoTo(AvatarSimulation& avatar, const WalkRequest& goal) {
   const DVec3 away = avatar.base().position_m - goal.position_m;
   walk.away_m = std::hypot(away.x, away.z);
   walk.away_rad = std::fabs(WrapAngle(avatar.base().heading_rad - goal.heading_rad));
+  // The body comes to rest while the avatar settles.
+  for (double t = 0.0; t < 0.5; t += kTickS) avatar.Advance(kTickS);
   const ConstPoseSpan pose = avatar.pose();
   walk.root_m = std::hypot(pose.root_position_m.x - goal.position_m.x,
                            pose.root_position_m.z - goal.position_m.z);

@@ -40,6 +40,7 @@ struct SynthesizeCommand {
   double fps = 60.0;
   bool no_correction = false;
   bool no_planting = false;
+  bool no_idle = false;
   bool json = false;
 };
 int RunSynthesize(const SynthesizeCommand& command);

@@ -167,6 +167,8 @@ int Run(int argc, char** argv) {
                            "Do not correct parameters when a movement starts");
   synthesize_app->add_flag("--no-planting", synthesize.no_planting,
                            "Do not plant feet; the blended feet may slide");
+  synthesize_app->add_flag("--no-idle", synthesize.no_idle,
+                           "Keep standing avatars still in their last pose");
   AddJson(synthesize_app, synthesize.json);
   synthesize_app->footer(
       "Example:\n  echo '{\"movements\":[{\"step\":{\"length_m\":0.6}}]}' > c.json\n"

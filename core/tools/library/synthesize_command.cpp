@@ -85,6 +85,7 @@ int RunSynthesize(const SynthesizeCommand& command) {
                              .fps = command.fps,
                              .options = {.run_time_correction = !command.no_correction,
                                          .foot_planting = !command.no_planting,
+                                         .idle_motion = !command.no_idle,
                                          .terrain = choreography->terrain},
                              .layers = choreography->layers};
   const auto synthesis = Synthesize(input);

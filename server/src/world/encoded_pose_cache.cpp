@@ -152,7 +152,7 @@ void EncodedPoseCache::Request(Slot& slot, AvatarSimulation& avatar) {
   // Layers change the pose independently of the avatar's movement.
   const bool has_layers = !avatar.is_event_free() && !avatar.layers().empty();
   if (!has_layers && Contains(slot, avatar.revision())) return;
-  if (const Movement* movement = avatar.movement(); movement != nullptr && !has_layers) {
+  if (const Movement* movement = avatar.displayed_movement(); movement != nullptr && !has_layers) {
     Schedule(slot, avatar.revision(), *movement, avatar.movement_time_s());
     return;
   }

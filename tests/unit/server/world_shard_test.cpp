@@ -424,6 +424,7 @@ std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayDelayedCrowd(int sha
   AvatarBudget budget(100, 100);
   ThreadMetrics metrics;
   const auto world = Bench::MakeWorld();
+  world->avatar_options.idle_motion = false;  // The first pose that changes shows the start.
   std::map<AvatarId, std::vector<std::vector<std::byte>>> poses;
   for (int s = 0; s < shard_count; ++s) {
     WorldShard shard({.world = world,

@@ -78,6 +78,13 @@ struct AvatarOptions {
   /// Hold feet still where they land. If false, feet follow the blended pose and may slide.
   bool foot_planting = true;
   BlendKind blend = BlendKind::kInertialization;
+  /// Let standing avatars settle into the library's stand pose, breathe, sway and shift their
+  /// weight. Their feet do not move. If false, or if feet are not planted, avatars stand still in
+  /// the last pose of their last movement.
+  bool idle_motion = true;
+  /// Selects the place in the loop of the idle motion, so that avatars of a crowd do not move in
+  /// unison.
+  std::uint64_t idle_seed = 0;
   /// Ground that the feet land on. Null: level ground at the avatar's height; requests with a
   /// height then raise or lower it.
   std::shared_ptr<const Terrain> terrain;

@@ -18,13 +18,14 @@ namespace stridewire {
 struct LayerClip;
 struct LegRig;
 struct LocomotionProfile;
+struct StandMotion;
 struct Transition;
 
 enum class MovementKind : std::uint8_t {
   kStepLeft = 0,   ///< The left foot moves.
   kStepRight = 1,  ///< The right foot moves.
   kJump = 2,
-  kStand = 3,  ///< Standing still. No group of a library has this kind.
+  kStand = 3,  ///< Standing. Only the groups that are generated for standing have this kind.
 };
 
 /// Returns the name of a kind, for example "step_left".
@@ -114,6 +115,9 @@ inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 /// this text.
 inline constexpr std::string_view kCompletedSource = "completed";
 
+/// Longest time over which a difference pose fades out (T in Section 5 of the paper), in seconds.
+inline constexpr double kEaseOutS = 0.2;
+
 /// Examples that can be blended with each other. They have the same kind, parameters, number of
 /// keytimes and grid. All spans point into the bytes of the library.
 ///
@@ -145,6 +149,7 @@ struct MotionGroup {
   /// [example]: origin, for example "16_21.bvh 0.93-1.47 s".
   std::vector<std::string_view> sources;
   std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if it is a mirrored copy, else 0.
+  double ease_out_s = kEaseOutS;           ///< Longest time over which difference poses fade out.
   /// True if the sources of all examples begin with kCompletedSource. Requests prefer other groups.
   bool is_completed = false;
 
@@ -167,7 +172,7 @@ class MotionLibrary {
  public:
   static constexpr int kFormatVersion = 3;
   static constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
-  static constexpr int kMaxGroups = 256;
+  static constexpr int kMaxGroups = 254;       ///< Movement records store indices as bytes.
   static constexpr int kMaxExamples = 4096;    ///< Per group.
   static constexpr int kMaxGridPoints = 4096;  ///< Per group.
 
@@ -187,10 +192,23 @@ class MotionLibrary {
 
   [[nodiscard]] const Skeleton& skeleton() const { return skeleton_; }
   [[nodiscard]] const GridLayout& layout() const { return layout_; }
-  [[nodiscard]] std::span<const MotionGroup> groups() const { return groups_; }
+  /// The groups of the library file.
+  [[nodiscard]] std::span<const MotionGroup> groups() const {
+    return std::span(groups_).first(file_group_count_);
+  }
+  /// Returns a group of the file, or the settle or idle group.
   [[nodiscard]] const MotionGroup& group(int index) const {
     return groups_[static_cast<std::size_t>(index)];
   }
+  /// Number of groups including those that are generated for standing avatars.
+  [[nodiscard]] int group_count() const { return static_cast<int>(groups_.size()); }
+  /// True if the library has motion for standing avatars. It is generated from the stand pose if
+  /// feet can be planted (LegRig::is_usable).
+  [[nodiscard]] bool has_stand_motion() const { return stand_motion_ != nullptr; }
+  /// Index of the group that holds the stand pose, into which avatars blend after their last step.
+  [[nodiscard]] int settle_group() const { return static_cast<int>(file_group_count_); }
+  /// Index of the group with the loop that standing avatars play.
+  [[nodiscard]] int idle_group() const { return static_cast<int>(file_group_count_) + 1; }
   /// Clips that can be played over movements, at most kMaxLayerClips. Their names are unique.
   [[nodiscard]] std::span<const LayerClip> layers() const;
   /// Returns the index of the layer with this name, or -1.
@@ -218,16 +236,20 @@ class MotionLibrary {
  private:
   MotionLibrary();
   [[nodiscard]] Status Load();
+  [[nodiscard]] Status LoadContent();
+  void AddStandMotion();
   [[nodiscard]] Status LoadTransitions(const std::vector<Transition>& transitions);
 
   Skeleton skeleton_;
   GridLayout layout_;
-  std::vector<MotionGroup> groups_;
+  std::vector<MotionGroup> groups_;  // Those of the file, then those of stand_motion_.
+  std::size_t file_group_count_ = 0;
   std::vector<LayerClip> layers_;
   std::vector<Transition> transitions_;
   Pose stand_pose_;
   std::unique_ptr<const LegRig> leg_rig_;
   std::unique_ptr<const LocomotionProfile> locomotion_profile_;
+  std::unique_ptr<const StandMotion> stand_motion_;
   std::string hash_;
   int max_example_count_ = 0;
   std::span<const std::byte> bytes_;  // Mapped or allocated memory, 64-byte aligned.

@@ -76,7 +76,7 @@ void AvatarBody::StartWeighted(const BaseFrame& base, double rate) {
 void AvatarBody::SetStartOffset(double time_s) {
   STRIDEWIRE_CHECK(time_s >= 0.0 && time_s < movement.duration_s());
   movement.start_offset_s = time_s;
-  movement.ease_out_s = std::min(kEaseOutS, movement.duration_s() - time_s);
+  movement.ease_out_s = std::min(group().ease_out_s, movement.duration_s() - time_s);
 }
 
 template <typename Landing>

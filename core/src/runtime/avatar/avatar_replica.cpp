@@ -107,12 +107,17 @@ void ReadLayers(const MotionLibrary& library, LayerStack& layers, Reader& reader
 }
 
 template <typename Reader>
-void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reader) {
+void ReadWeights(const MotionLibrary& library, bool plants_feet, Movement& movement,
+                 Reader& reader) {
   int group = 0;
   reader.Index(group);
   if (!reader.ok()) return;
-  if (static_cast<std::size_t>(group) >= library.groups().size()) {
+  if (group >= library.group_count()) {
     reader.Reject("a movement record refers to a group that the library does not have");
+    return;
+  }
+  if (library.group(group).kind == MovementKind::kStand && !plants_feet) {
+    reader.Reject("a movement record contains a stand without planted feet");
     return;
   }
   movement.group = group;
@@ -137,16 +142,17 @@ void CheckRate(double rate, Reader& reader) {
   }
 }
 
-// Sets the release and landing times and the root weights of the feet, which follow from the kind
-// and the keytimes of the movement.
+// Sets the release and landing times, the root weights and the height locks of the feet, which
+// follow from the kind and the keytimes of the movement.
 void SetTimes(MovementKind kind, Movement& movement) {
   const SwingTimes times = SwingTimesOf(kind, movement);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     FootTrajectory& trajectory = movement.feet.foot(foot);
-    const bool moves = !IsStep(kind) || foot == MovingFoot(kind);
+    const bool moves = kind != MovementKind::kStand && (!IsStep(kind) || foot == MovingFoot(kind));
     trajectory.release_s = moves ? times.release_s : FootTrajectory::kNever;
     trajectory.land_s = moves ? times.land_s : FootTrajectory::kNever;
     trajectory.root_weight = !IsStep(kind) ? 0.5 : moves ? 0.0 : 1.0;
+    trajectory.locks_height = kind == MovementKind::kStand;
   }
 }
 
@@ -215,7 +221,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& 
     BaseFrame base;
     LandingDecision decision{.is_on_terrain = (flags & record::kOnTerrain) != 0};
     reader.F64(time_s);
-    ReadWeights(*body_.library, movement, reader);
+    ReadWeights(*body_.library, body_.plants_feet, movement, reader);
     reader.F64(base.heading_rad);
     if ((flags & record::kHasRate) != 0) reader.F64(rate);
     if ((flags & record::kIsEntered) != 0) reader.F64(start_offset_s);
@@ -263,7 +269,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
     double start_offset_s = 0.0;
     double extra_turn_rad = 0.0;
     reader.F64(movement_time_s_);
-    ReadWeights(*body_.library, movement, reader);
+    ReadWeights(*body_.library, body_.plants_feet, movement, reader);
     record::Vector(reader, base.position_m);
     reader.F64(base.heading_rad);
     reader.F64(rate);

@@ -45,7 +45,8 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
   body_.pose.root_position_m =
       Vec3(start.position_m + RotateYaw(start.heading_rad, DVec3(stand.root_position_m)));
   body_.pose.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
-  is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
+  is_moving_ = is_in_stand_ = is_idling_ = is_idle_reported_ = is_walking_ = false;
+  is_settled_ = true;
   inserted_steps_ = 0;
   body_.blended_pose = body_.pose;
   moved_until_s_ = next_event_s_ = -1.0;
@@ -91,6 +92,7 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     interrupts_ = may_redirect_ = request.interrupt == Interrupt::kNow && is_moving_;
     if (is_in_stand_) stand_left_s_ = 0.0;
   }
+  if (!is_moving_) next_event_s_ = -1.0;
   if (queue_size() == 0) {
     start_not_before_s_ = time_s_ + start_delay_s;
     if (earlier_start_s > time_s_)
@@ -161,7 +163,7 @@ void AvatarSimulation::Advance(double dt_s) {
 }
 
 void AvatarSimulation::UpdatePose() {
-  if (is_moving_) body_.Evaluate(movement_time_s_);
+  if (displayed_movement() != nullptr) body_.Evaluate(movement_time_s_);
   body_.ApplyLayers();
 }
 
@@ -189,7 +191,7 @@ void AvatarSimulation::UpdatePoses(std::span<AvatarSimulation* const> avatars,
         avatars.first(std::min(avatars.size(), jobs.size()));
     std::size_t moving = 0;
     for (AvatarSimulation* avatar : block) {
-      if (!avatar->is_moving_) continue;
+      if (avatar->displayed_movement() == nullptr) continue;
       jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.pose};
     }
     EvaluatePoses(evaluator, std::span(jobs).first(moving));
@@ -229,9 +231,11 @@ void AvatarSimulation::AdvanceState(double dt_s, PlanScratch& scratch) {
 
 // Returns the movement time of the next event, or -1 if the last Advance was not event-free.
 double AvatarSimulation::NextEventTime() const {
-  const bool is_event_free = is_moving_ && !interrupts_ && body_.layers.empty() &&
+  const bool is_waiting = is_idling_ && !is_in_stand_ && queue_size() == 0;
+  const bool is_event_free = (is_moving_ || is_waiting) && !interrupts_ && body_.layers.empty() &&
                              events_.empty() && change_ == AvatarChange{};
   if (!is_event_free) return -1.0;
+  if (is_waiting) return body_.movement.duration_s();
   const double strike_s = StrikeTime();
   return movement_time_s_ < strike_s ? std::min(strike_s, body_.movement.duration_s())
                                      : body_.movement.duration_s();
@@ -274,6 +278,9 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     if (!may_change || !StartNext(scratch)) break;
   }
   STRIDEWIRE_CHECK(time_s_ <= end_s);
+  // Idle motion that plays on advances by the whole tick at once, as replicas advance it: a sum of
+  // two parts of a tick may differ in the last bit.
+  if (!is_moving_) AdvanceIdleMotion(is_idling_ ? dt_s : left_s, scratch);
   time_s_ = end_s;
   change_.idle_changed = idle() != std::exchange(was_idle_, idle());
 }
@@ -305,7 +312,10 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   if (IsStartDelayed() && last_group_ == body_.library->groups().size()) return false;
   start_not_before_s_ = 0.0;
   is_idle_reported_ = false;
-  if (stand == nullptr) SwitchPlanting();
+  if (stand == nullptr) {
+    EndIdleMotion();
+    SwitchPlanting();
+  }
   if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {
     StartWalkStep(scratch);
     return true;
@@ -495,12 +505,13 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;
 
-  STRIDEWIRE_CHECK(!is_in_stand_ && body_.movement.group == plan.group);
+  STRIDEWIRE_CHECK(!is_in_stand_ && !is_idling_ && body_.movement.group == plan.group);
   STRIDEWIRE_CHECK(body_.movement.feet.is_active == body_.plants_feet);
   ++revision_;
   change_.has_begun = true;
   change_.begun_keeps_speed = keeps_speed();
   is_moving_ = true;
+  is_settled_ = false;
   body_.begins_planting = false;
   is_exact_ = plan.exact.has_value();
   inserted_steps_ = 0;

@@ -135,15 +135,21 @@ class AvatarSimulation {
 
   /// The current movement, or null while standing. Valid until the next Advance.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
+  /// The movement that the displayed pose follows: the current movement or, while standing, the
+  /// idle motion. Null if the avatar stands still. Valid until the next Advance.
+  [[nodiscard]] const Movement* displayed_movement() const {
+    return is_moving_ || is_idling_ ? &body_.movement : nullptr;
+  }
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// Seconds since construction.
   [[nodiscard]] double time_s() const { return time_s_; }
-  /// Changes whenever a movement begins or ends and on Teleport. While it stays the same, the
-  /// displayed pose without layers follows from movement() and movement_time_s().
+  /// Changes whenever a movement or idle motion begins or ends, and on Teleport. While it stays the
+  /// same, the displayed pose without layers follows from displayed_movement() and
+  /// movement_time_s().
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// True if the avatar moves, has no layers, and the last Advance produced neither events nor
-  /// changes. While it is true, time_s(), revision(), movement_time_s() and idle() are in one cache
-  /// line.
+  /// True if the avatar moves or idles, has no layers, and the last Advance produced neither events
+  /// nor changes. While it is true, time_s(), revision(), movement_time_s() and idle() are in one
+  /// cache line.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
   /// Prefetches that cache line, for callers that check many avatars.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
@@ -229,6 +235,9 @@ class AvatarSimulation {
   void FinishMovement(double at_s);
   void KeepToLine(const DVec3& line_m);
   void FinishStand();
+  void AdvanceIdleMotion(double by_s, PlanScratch& scratch);
+  void BeginIdleMotion(double left_s, PlanScratch& scratch);
+  void EndIdleMotion();
   [[nodiscard]] DVec3 StandingPosition(Foot foot) const;
   [[nodiscard]] Vec3 LandingBall(Foot foot) const;
   [[nodiscard]] double StrikeTime() const;
@@ -242,6 +251,8 @@ class AvatarSimulation {
   // At most one of the following is true: a movement is in progress, or a requested stand is.
   bool is_moving_ = false;
   bool is_in_stand_ = false;
+  bool is_idling_ = false;   // True while body_.movement is the settle or idle motion.
+  bool is_settled_ = false;  // True if the avatar stands in the stand pose.
   bool is_idle_reported_ = false;
   bool was_idle_ = false;  // Value of idle() after the previous Advance.
   // True if the last step left the feet apart, so that a closing step must precede a stand.

@@ -104,7 +104,7 @@ bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
   }
   RecordWriter writer(out);
   writer.Flags(flags);
-  STRIDEWIRE_CHECK(!change.has_begun || avatar.movement() != nullptr);
+  STRIDEWIRE_CHECK(!change.has_begun || avatar.displayed_movement() != nullptr);
   if (change.has_left && !change.is_left_at_end) writer.F64(change.left_s);
   if (change.has_begun) WriteBegun(avatar, flags, decision, writer);
   if (change.has_layers) WriteLayers(body.layers, writer);
@@ -113,7 +113,7 @@ bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
 
 void AppendState(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
   const AvatarBody& body = avatar.body();
-  const bool is_moving = avatar.movement() != nullptr;
+  const bool is_moving = avatar.displayed_movement() != nullptr;
   unsigned flags = CommonFlags(avatar) | record::kIsState;
   if (is_moving) flags |= record::kMoves;
   if (!body.layers.empty()) flags |= record::kLayers;

@@ -70,6 +70,7 @@ void FootprintFields(Stream& stream, P& print) {
 
 template <typename Stream, typename L>
 void DecisionFields(Stream& stream, unsigned flags, MovementKind kind, L& decision) {
+  if (kind == MovementKind::kStand) return;
   if ((flags & kIsSteered) != 0) stream.F64(decision.extra_turn_rad);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     if (IsStep(kind) && foot != MovingFoot(kind)) continue;

@@ -18,6 +18,7 @@
 #include "runtime/library/knee_hinges.h"
 #include "runtime/library/library_file.h"
 #include "runtime/library/locomotion_profile.h"
+#include "runtime/library/stand_motion.h"
 #include "runtime/library/transition.h"
 #include "runtime/skeleton/layer_clip.h"
 #include "runtime/skeleton/leg_rig.h"
@@ -421,7 +422,7 @@ std::span<const LayerClip> MotionLibrary::layers() const { return layers_; }
 std::span<const Transition> MotionLibrary::transitions() const { return transitions_; }
 
 const Transition* MotionLibrary::FindTransition(std::size_t from, std::size_t to) const {
-  return transitions_.empty() ? nullptr : &transitions_[from * (groups_.size() + 1) + to];
+  return transitions_.empty() ? nullptr : &transitions_[from * (groups().size() + 1) + to];
 }
 
 int MotionLibrary::FindLayer(std::string_view name) const {
@@ -500,6 +501,19 @@ Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::FromBytes(
 }
 
 Status MotionLibrary::Load() {
+  if (Status status = LoadContent(); !status) return status;
+  AddStandMotion();
+  return {};
+}
+
+void MotionLibrary::AddStandMotion() {
+  if (!leg_rig_->is_usable) return;
+  stand_motion_ = std::make_unique<const StandMotion>(skeleton_, *leg_rig_, stand_pose_);
+  groups_.push_back(stand_motion_->settle);
+  groups_.push_back(stand_motion_->idle);
+}
+
+Status MotionLibrary::LoadContent() {
   if (bytes_.size() < kLibraryHeaderBytes) {
     return Fail(ErrorCode::kMalformed, "not a Stridewire library: shorter than its header");
   }
@@ -566,6 +580,7 @@ Status MotionLibrary::Load() {
     max_example_count_ = std::max(max_example_count_, group->example_count);
     groups_.push_back(std::move(*group));
   }
+  file_group_count_ = groups_.size();
   leg_rig_ =
       std::make_unique<const LegRig>(MakeLegRig(skeleton_, stand_pose_, LearnKneeHinges(*this)));
   locomotion_profile_ = std::make_unique<const LocomotionProfile>(MakeLocomotionProfile(*this));

@@ -16,7 +16,7 @@ namespace stridewire {
 ///   heading:    locked while the sole is on the ground; with the heel up it follows the blend
 ///   height:     values to add, eased from one to the next, and `level_m`; otherwise the ball's
 ///               height follows the blend, because locking it would bend knees by 25 degrees on
-///               captures
+///               captures (but see locks_height)
 struct FootTrajectory {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -32,12 +32,15 @@ struct FootTrajectory {
   DVec3 land_offset_m = DVec3(0.0);
   DVec3 land_velocity_m_s = DVec3(0.0);
   // Corrections of the height and heading of the blended foot: at t = 0, after the difference pose
-  // has faded, and from landing on.
+  // has faded, and from landing on. If `locks_height`, the heights of the ball above the footprint.
   std::array<double, 3> height_m{};
   std::array<double, 3> turn_rad{};
   /// Coefficients of u, u^2, u^3 and u^4 of a further height to add, where u is the elapsed
   /// fraction of the movement. It keeps the sole of a step's supporting foot on the ground.
   std::array<double, 4> level_m{};
+  /// Lock the height of the ball as well. A standing avatar needs that, because its legs straighten
+  /// while its feet must stay on the ground.
+  bool locks_height = false;
   /// Ground normals at `from` and `to`.
   std::array<Vec3, 2> normals{Vec3(0.0f, 1.0f, 0.0f), Vec3(0.0f, 1.0f, 0.0f)};
   /// Additional heights early, in the middle and late in the swing, to clear the ground. Each is

@@ -74,7 +74,7 @@ void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& mo
   BlendKeytimes(group.keytimes_s, movement.weights, keytimes);
   for (double& keytime_s : keytimes) keytime_s /= rate;
   movement.warp = TimeWarp(keytimes, group.cells);
-  movement.ease_out_s = std::min(kEaseOutS, movement.duration_s());
+  movement.ease_out_s = std::min(group.ease_out_s, movement.duration_s());
 }
 
 BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {

@@ -19,9 +19,6 @@ namespace stridewire {
 /// A movement may turn this much more or less than its examples.
 inline constexpr double kMaxExtraTurnRad = 0.3;
 
-/// Longest time over which a difference pose fades out (T in Section 5 of the paper), in seconds.
-inline constexpr double kEaseOutS = 0.2;
-
 /// Limits on the playback speed of a movement.
 inline constexpr double kMinRate = 0.5;
 inline constexpr double kMaxRate = 2.0;
@@ -43,7 +40,7 @@ struct Movement {
   double extra_turn_rad = 0.0;
   /// Movement time at which it begins; above 0 if it continues a redirected swing.
   double start_offset_s = 0.0;
-  double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration).
+  double ease_out_s = kEaseOutS;     ///< T = min(MotionGroup::ease_out_s, duration).
   double rate = 1.0;                 ///< Playback speed relative to the examples, > 0.
   std::vector<float> weights;        ///< [example]: blend weights, whose sum is 1.
   Pose difference;                   ///< D = P - M(start_offset_s), in world space.

@@ -313,6 +313,18 @@ class Planner {
     return settled_m + raise_m / std::max(settled, kLeastSettled);
   }
 
+  // Keeps both feet on their footprints while an avatar stands. `previous` are the feet of the pose
+  // that the movement blends from, before planting.
+  void StandStill(const FootLocks& locks, const FeetAt& previous) {
+    for (std::size_t f = 0; f < 2; ++f) {
+      FootTrajectory& trajectory = movement_.feet.feet[f];
+      const double rest_m = rig_.sides[f].ball_height_m + SlopeRise(rig_.sides[f], locks[f].normal);
+      const double begin_m = previous[f].ball_m.y + locks[f].height_m - locks[f].print.position_m.y;
+      trajectory.height_m = {begin_m, rest_m, rest_m};
+      trajectory.locks_height = true;
+    }
+  }
+
   // Returns the positions where the feet of a jump land, [foot].
   std::array<DVec3, 2> ChooseJumpLanding(const FootLocks& locks, const RequestPlan& request) {
     const DVec3 centre =
@@ -648,6 +660,10 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     trajectory.turn_rad = {lock.turn_rad, lock.turn_rad + turn_rad, lock.turn_rad + turn_rad};
     trajectory.height_m[2] = trajectory.height_m[1];
     trajectory.root_weight = is_step ? (f == x ? 1.0 : 0.0) : 0.5;
+  }
+  if (group.kind == MovementKind::kStand) {
+    planner.StandStill(locks, previous);
+    return planner.Entry();
   }
   for (const Foot foot : kBoth) {
     if (is_step && foot != moving) continue;

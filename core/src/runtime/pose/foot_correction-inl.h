@@ -19,6 +19,7 @@ struct TrajectoryOf {
   Number from_heading, to_heading, release_turn, root_weight, residual_turn, residual_turn_s;
   Number lift[3];
   Number residual_over_s, release_s, land_s;
+  Number locks_height;  // 1 if FootTrajectory::locks_height, else 0.
 };
 
 template <typename Number, typename Vector>
@@ -80,7 +81,8 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   const Number risen = one - EaseOut(DivideBy(s - rise_start, 1.0 - kSinkStart));
   const auto& level = trajectory.level;
   const Number u = timing.OfDuration(t);
-  c.offset.y = height[0] + settled * (height[1] - height[0]) + rise * risen +
+  const Number locked = Select(trajectory.locks_height > zero, c.offset.y, zero);
+  c.offset.y = locked + height[0] + settled * (height[1] - height[0]) + rise * risen +
                u * (level[0] + u * (level[1] + u * (level[2] + u * level[3]))) +
                trajectory.lift[0] * LiftShareOf(kLiftCurves[0], s) +
                trajectory.lift[1] * LiftShareOf(kLiftCurves[1], s) +

@@ -33,13 +33,22 @@ T AddBoth(const T& base, const T& a, const T& b) {
 #include "runtime/pose/foot_correction-inl.h"
 #undef STRIDEWIRE_INLINE
 
+// Returns the time over which planting spreads changes of the root: the duration of the movement.
+// If both feet stand throughout, the root instead moves while the difference pose fades out.
+double SpreadTime(const Movement& movement) {
+  const auto& feet = movement.feet.feet;
+  const bool stands =
+      feet[0].release_s == FootTrajectory::kNever && feet[1].release_s == FootTrajectory::kNever;
+  return stands ? movement.ease_out_s / kRootRisePart : movement.duration_s();
+}
+
 struct Timing {
   double time_s, start_offset_s, duration_s, ease_out_s, extra_turn;
 
   Timing(const Movement& movement, double at_s)
       : time_s(at_s),
         start_offset_s(movement.start_offset_s),
-        duration_s(movement.duration_s()),
+        duration_s(SpreadTime(movement)),
         ease_out_s(movement.ease_out_s),
         extra_turn(movement.extra_turn_rad) {}
   [[nodiscard]] double OfDuration(double x) const { return x / duration_s; }
@@ -73,7 +82,8 @@ TrajectoryOf<double, DVec3> TrajectoryFor(const FootPlan& plan, Foot foot) {
           .lift = {from.lift_m[0], from.lift_m[1], from.lift_m[2]},
           .residual_over_s = residual.over_s,
           .release_s = from.release_s,
-          .land_s = from.land_s};
+          .land_s = from.land_s,
+          .locks_height = from.locks_height ? 1.0 : 0.0};
 }
 
 Quat RotationFromUp(const Vec3& normal) {
@@ -254,13 +264,13 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     add(DVec3(trajectory.normals[0]), trajectory.land_s);
     add(DVec3(trajectory.normals[1]), trajectory.lift_m[0]);
     add(residual.offset_m, trajectory.lift_m[2]);
-    add(residual.offset_m_s, 0.0);
+    add(residual.offset_m_s, trajectory.locks_height ? 1.0 : 0.0);
     add(trajectory.root_shift_m, 0.0);
     const auto& level_m = trajectory.level_m;
     add({level_m[0], level_m[1], level_m[2]}, level_m[3]);
   }
   add(plan.root_residual_m, movement.extra_turn_rad);
-  add(plan.root_residual_m_s, movement.duration_s());
+  add(plan.root_residual_m_s, SpreadTime(movement));
   add({movement.start_offset_s, movement.ease_out_s, plan.keeps_above_ground ? 1.0 : 0.0},
       plan.plant_fade_s);
   return packed;

@@ -261,7 +261,7 @@ void SoaPoseEvaluator::Begin(std::span<const SampleRun> runs, int count) {
   for (std::size_t i = 0; i < work.lanes; ++i) {
     const Movement& movement = work.movement(i);
     STRIDEWIRE_CHECK(movement.feet.is_active == work.is_planted);
-    STRIDEWIRE_CHECK(static_cast<std::size_t>(movement.group) < work.library.groups().size());
+    STRIDEWIRE_CHECK(movement.group < work.library.group_count());
     for (std::size_t c = 0; c < 3; ++c) {
       work.base_m[c].of[i] = movement.base.position_m[static_cast<int>(c)];
     }

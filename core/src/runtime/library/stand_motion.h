@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "runtime/skeleton/leg_rig.h"
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+
+/// Length of the loop of the idle motion, in seconds.
+inline constexpr double kIdleLoopS = 40.0;
+
+/// Motion of standing avatars, generated from the stand pose when a library is opened. Both groups
+/// have the kind kStand, one example and no parameters, and are evaluated like steps.
+///
+///   settle: the stand pose. After its last movement an avatar blends into it.
+///   idle:   a loop of breathing, sway and weight shifts. Its last kIdleTailS seconds repeat its
+///           first ones, so that a blend that begins late in the loop still has time to fade out.
+///
+/// The feet do not move. The same skeleton and stand pose give the same bits on every machine.
+struct StandMotion {
+  /// `rig` must be usable.
+  StandMotion(const Skeleton& skeleton, const LegRig& rig, const Pose& stand_pose);
+  StandMotion(const StandMotion&) = delete;
+  StandMotion& operator=(const StandMotion&) = delete;
+
+  MotionGroup settle;
+  MotionGroup idle;
+
+ private:
+  // A part of a grid row, aligned as the kernels require.
+  struct alignas(64) RowPart {
+    float of[16] = {};
+  };
+  std::vector<RowPart> settle_grid_;
+  std::vector<RowPart> idle_grid_;
+};
+
+}  // namespace stridewire
