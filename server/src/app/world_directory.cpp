@@ -31,6 +31,9 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   world->name = std::string(name);
   world->avatar_options.run_time_correction = config_.run_time_correction;
   world->avatar_options.foot_planting = config_.foot_planting;
+  world->avatar_options.idle_motion =
+      is_configured ? configured->second.idle_motion.value_or(config_.idle_motion)
+                    : config_.idle_motion;
   world->interest_cell_m = config_.interest_cell_m;
   world->persistent = is_configured ? configured->second.persistent : config_.persistent;
   const bool has_library = is_configured && !configured->second.library.empty();

@@ -199,6 +199,8 @@ std::vector<ConfigKey> MakeKeys() {
            &Config::run_time_correction),
       Flag("foot_planting", "Keep feet fixed on the ground between landing and lifting",
            &Config::foot_planting),
+      Flag("idle_motion", "Let standing avatars breathe, sway and shift their weight",
+           &Config::idle_motion),
       Number("interest_cell_m", "Cell size in m of the grid that finds the avatars of a region",
              &Config::interest_cell_m, 1.0, 1000.0),
       Flag("allow_insecure",
@@ -406,6 +408,7 @@ std::string PrintConfig(const Config& config) {
     if (!world.library.empty()) text += fmt::format("library = {}\n", Quoted(world.library));
     if (!world.terrain.empty()) text += fmt::format("terrain = {}\n", Quoted(world.terrain));
     text += fmt::format("persistent = {}\n", world.persistent);
+    if (world.idle_motion) text += fmt::format("idle_motion = {}\n", *world.idle_motion);
   }
   return text;
 }

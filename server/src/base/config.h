@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,7 @@ struct WorldConfig {
   std::string library;      ///< Motion library: "builtin" or a file. Empty: the default library.
   std::string terrain;      ///< A terrain file; empty: flat ground.
   bool persistent = false;  ///< Avatars outlive the session that spawned them.
+  std::optional<bool> idle_motion;  ///< Default: Config::idle_motion.
   bool operator==(const WorldConfig&) const = default;
 };
 
@@ -51,6 +53,7 @@ struct Config {
   bool run_time_correction = true;  ///< True: the blend weights of each movement are corrected.
   /// True: feet stay fixed on the ground between landing and lifting.
   bool foot_planting = true;
+  bool idle_motion = true;       ///< True: standing avatars breathe, sway and shift their weight.
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
   bool allow_insecure = false;
   /// True: when a client joins a world that the file does not name, the server creates it.

@@ -654,7 +654,7 @@ TEST(WorldDirectory, CountsMembersAndRemovesEmptyWorlds) {
   Config config;
   config.library = "test";
   config.limits.max_worlds = 2;
-  config.worlds["hall"] = {.library = "", .terrain = "", .persistent = true};
+  config.worlds["hall"] = {.library = "", .terrain = "", .persistent = true, .idle_motion = false};
   Libraries libraries;
   libraries.Add("test", MakeTestLibrary());
   const Terrains terrains;
@@ -663,10 +663,12 @@ TEST(WorldDirectory, CountsMembersAndRemovesEmptyWorlds) {
   ASSERT_TRUE(hall);
   EXPECT_TRUE((*hall)->persistent);
   EXPECT_TRUE((*hall)->avatar_options.run_time_correction);
+  EXPECT_FALSE((*hall)->avatar_options.idle_motion);
   EXPECT_EQ(*directory.Join("hall"), *hall);
   const auto other = directory.Join("other");
   ASSERT_TRUE(other);
   EXPECT_FALSE((*other)->persistent);
+  EXPECT_TRUE((*other)->avatar_options.idle_motion);
   EXPECT_EQ(directory.Join("third").error().code, StatusCode::kLimitReached);
   EXPECT_EQ(directory.Join("no/name").error().code, StatusCode::kInvalidArgument);
   EXPECT_TRUE(directory.DropEmpty().empty());
