@@ -37,8 +37,9 @@ inline constexpr Vec3 kBuiltinHeelOffsetM = Vec3(0.0f, -0.06825f, -0.06f);
 /// The feet are placed first (heel, flat foot, ball and toe tip exactly fixed on the ground), then
 /// the pelvis, then the legs by inverse kinematics, then the rest of the body. The set of steps is
 /// that of the paper, Section 6. Sources of angles, timing and segments, as rounded in textbooks:
-/// Winter, Biomechanics and Motor Control of Human Movement; Perry and Burnfield, Gait Analysis;
-/// Grieve and Gear 1966 (cadence).
+/// Winter, Biomechanics and Motor Control of Human Movement; Perry and Burnfield, Gait Analysis.
+/// The code cites the sources of the other numbers. The design is explained in
+/// docs/decisions/0036-the-generated-walk-follows-biomechanics.md.
 [[nodiscard]] RawLibrary GenerateBuiltinLibrary();
 
 }  // namespace stridewire

@@ -2,10 +2,9 @@
 
 namespace stridewire::builtin {
 
-/// exp, x^y and tanh from exactly rounded operations. They give the same bytes on every machine,
+/// exp and tanh from exactly rounded operations. They give the same bytes on every machine,
 /// while C libraries differ in the last digit. The relative error is below 1e-13 for |x| <= 20.
 [[nodiscard]] double Exp(double x);
-[[nodiscard]] double Power(double base, double exponent);  ///< base > 0.
 [[nodiscard]] double Tanh(double x);
 
 /// Returns 0 for x <= 0, 1 for x >= 1, and 3x^2 - 2x^3 between them.

@@ -19,7 +19,7 @@ inline constexpr double kBallAheadOfAnkleM = 0.13;
 inline constexpr double kToeM = 0.07;  ///< Distance from ball to toe tip.
 inline constexpr double kHipHalfWidthM = 0.085;
 inline constexpr double kAnkleHalfWidthM = 0.05;  ///< Half the step width.
-inline constexpr double kStandingHipHeightM = 0.926;
+inline constexpr double kStandingHipHeightM = 0.924;
 
 inline constexpr double kDegree = 0.017453292519943295;
 inline constexpr double kToeOutRad = 6.0 * kDegree;

@@ -41,13 +41,22 @@ double ToeOffPitch(const StepTiming& timing) {
 Curve MakeFixedPitch(const StepTiming& timing) {
   const GaitState& start = timing.start;
   const GaitState& end = timing.end;
-  // The heel starts to rise in the middle of single support.
-  const double heel_off_s = timing.toe_off_s + 0.42 * timing.swing_s();
+  // The heel rises slowly from the second half of single support and fast from the heel-strike of
+  // the other foot on.
+  const RollOff& roll_off = end.roll_off;
+  const double heel_off_s = timing.toe_off_s + roll_off.heel_rise_swing * timing.swing_s();
+  const double at_strike = roll_off.strike * end.toe_off_pitch_rad;
+  double strike_rate = 0.0;
+  if (!end.standing()) {
+    // A steeper cubic would lower the toes into the ground first.
+    const double steepest = 3.0 * at_strike / (timing.heel_strike_s - heel_off_s);
+    strike_rate =
+        std::min(roll_off.strike_rate * end.toe_off_pitch_rad / end.half_support_s, steepest);
+  }
   return Curve({{0.0, start.front_pitch_rad(), start.front_pitch_rate()},
                 {timing.toe_off_s, 0.0, 0.0},
                 {heel_off_s, 0.0, 0.0},
-                {timing.heel_strike_s, -0.42 * end.toe_off_pitch_rad,
-                 end.standing() ? 0.0 : -0.22 * end.toe_off_pitch_rad / end.half_support_s},
+                {timing.heel_strike_s, -at_strike, -strike_rate},
                 {timing.end_s, end.rear_pitch_rad(), end.rear_pitch_rate()}});
 }
 
@@ -60,16 +69,17 @@ Curve MakeMovingPitch(const StepTiming& timing) {
   const double b = ToeOffPitch(timing);
   const double a = StrikePitch(timing);
   const double swing = timing.swing_s();
+  const RollOff& roll_off = start.roll_off;
   std::vector<Curve::Knot> knots;
   if (start.standing()) {
     knots = {{0.0, 0.0, 0.0}, {0.4 * timing.toe_off_s, 0.0, 0.0}};
   } else {
     knots = {{0.0, start.rear_pitch_rad(), start.rear_pitch_rate()}};
   }
-  knots.push_back({timing.toe_off_s, -b, -0.32 * b / timing.toe_off_s});
-  knots.push_back({timing.toe_off_s + 0.13 * swing, -1.09 * b});
-  knots.push_back({timing.toe_off_s + 0.47 * swing, -0.45 * b});
-  knots.push_back({timing.toe_off_s + 0.74 * swing, 0.05 * a});
+  knots.push_back({timing.toe_off_s, -b, -roll_off.toe_off_rate * b / timing.toe_off_s});
+  knots.push_back({timing.toe_off_s + 0.15 * swing, -1.09 * b});
+  knots.push_back({timing.toe_off_s + 0.47 * swing, -roll_off.swing * b});
+  knots.push_back({timing.toe_off_s + 0.74 * swing, 0.0});
   knots.push_back({timing.toe_off_s + 0.94 * swing, a, 0.0});
   knots.push_back(
       {timing.heel_strike_s, 0.97 * a, -0.9 * a / std::max(timing.end.half_support_s, 0.06)});
@@ -78,22 +88,41 @@ Curve MakeMovingPitch(const StepTiming& timing) {
 }
 
 Curve MakeToeRock(const StepTiming& timing) {
-  const double rock = timing.start.toe_rock_rad;
+  const double rock = timing.start.toe_rock_rad();
   if (rock == 0.0) return Curve({{0.0, 0.0}});
   return Curve({{0.0, 0.0, 0.0}, {timing.toe_off_s, rock, 1.9 * rock / timing.toe_off_s}});
 }
 
-// Returns the angle of the toe joint in swing: it decreases from its value at toe-off to straight.
+// Returns the angle of the toe joint in swing. At first the toes keep their pitch while the foot
+// continues to turn, so that their tip stays above the ground. Then they straighten.
 Curve MakeToeBend(const StepTiming& timing) {
-  const double bend = ToeOffPitch(timing) - timing.start.toe_rock_rad;
-  const double straight_s = timing.toe_off_s + 0.45 * timing.swing_s();
+  const double bend = ToeOffPitch(timing) - timing.start.toe_rock_rad();
+  const double kept_s = timing.toe_off_s + 0.15 * timing.swing_s();
+  const double kept = bend + 0.12 * ToeOffPitch(timing);
+  const double straight_s = timing.toe_off_s + 0.5 * timing.swing_s();
   const double strike = StrikePitch(timing);
-  if (strike >= 0.0) return Curve({{timing.toe_off_s, bend, 0.0}, {straight_s, 0.0, 0.0}});
+  if (strike >= 0.0) {
+    return Curve({{timing.toe_off_s, bend}, {kept_s, kept, 0.0}, {straight_s, 0.0, 0.0}});
+  }
   // If the toes land first, they are flat on the ground from then on.
-  return Curve({{timing.toe_off_s, bend, 0.0},
+  return Curve({{timing.toe_off_s, bend},
+                {kept_s, kept, 0.0},
                 {straight_s, 0.0, 0.0},
                 {timing.toe_off_s + 0.7 * timing.swing_s(), 0.0, 0.0},
                 {timing.heel_strike_s, -0.97 * strike, 0.0}});
+}
+
+// Returns the position of a swinging foot along one axis, at the fraction `u` of its swing. It is
+// fastest at 70 % of the swing and slows down just before it lands, as in captures of walking.
+// Positions are in metres, velocities in metres per second.
+double SwingAlong(double u, double swing_s, double from, double from_velocity, double to,
+                  double to_velocity) {
+  const double way = to - from;
+  return Curve({{0.0, from, from_velocity * swing_s},
+                {0.35, from + 0.30 * way, 1.02 * way},
+                {0.72, from + 0.755 * way, 1.32 * way},
+                {1.0, to, to_velocity * swing_s}})
+      .At(u);
 }
 
 }  // namespace
@@ -180,6 +209,18 @@ FootPose FootPaths::MovingInSwing(double time_s) const {
   foot_pose.ankle_m = (2.0 * u3 - 3.0 * u2 + 1.0) * from +
                       (u3 - 2.0 * u2 + w) * swing * toe_off_velocity_ + (3.0 * u2 - 2.0 * u3) * to +
                       (u3 - u2) * swing * strike_velocity_;
+  if (timing_.shape.style != StepStyle::kStairs) {
+    foot_pose.ankle_m.x =
+        SwingAlong(u, swing, from.x, toe_off_velocity_.x, to.x, strike_velocity_.x);
+    foot_pose.ankle_m.z =
+        SwingAlong(u, swing, from.z, toe_off_velocity_.z, to.z, strike_velocity_.z);
+    // The ankle is highest early in the swing and then falls to slightly above its height at
+    // heel-strike.
+    foot_pose.ankle_m.y = Curve({{0.0, from.y, toe_off_velocity_.y * swing},
+                                 {0.72, to.y + 0.018, -0.06},
+                                 {1.0, to.y, strike_velocity_.y * swing}})
+                              .At(u);
+  }
   const double middle = 16.0 * u * u * (1.0 - u) * (1.0 - u);
   foot_pose.ankle_m.y += y0 + climb * climbed + lift_m_ * middle;
   foot_pose.ankle_m += bow_m_ * middle * SideSign(moving_) *
@@ -254,7 +295,8 @@ void FootPaths::RaiseSwingUntilClear() {
       const DVec3 tip = ball + toes * DVec3(0.0, 0.0, kToeM);
       const auto above = [&](const DVec3& point) { return point.y - GroundAt(point.z); };
       if (i >= 30 && (above(heel) < clearance || above(ball) < clearance)) return false;
-      if (above(tip) < (i >= 50 ? clearance : i >= 30 ? 0.012 : 0.0)) return false;
+      if (above(tip) < (i >= 50 ? clearance : i >= 30 ? 0.012 : i >= 15 ? 0.004 : 0.0))
+        return false;
     }
     return true;
   };

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "offline/builtin/step_shape.h"
+
 namespace stridewire::builtin {
 
 /// Frame rate of generated clips. Keytimes are whole frames, so that every state is a frame.
@@ -8,46 +10,69 @@ inline constexpr double kClipFps = 120.0;
 /// Rounds a time to whole frames.
 [[nodiscard]] double ToWholeFrames(double time_s);
 
-/// Returns the duration of a step in steady walking, in seconds. The cadence follows Grieve and
-/// Gear 1966: V = (L / 0.463 H)^(1/0.43) statures per second, 129.6 V^0.57 steps per minute. The
-/// result is limited to 0.42..0.75 s, since the walk ratio is constant only at normal speeds.
+/// Returns the duration of a step in steady walking, in seconds. It falls with the length, since
+/// people lengthen their steps and take more of them as they walk faster (Grieve and Gear 1966).
+/// The cadence is 107 steps per minute at 0.6 m, and 118 at 0.78 m. Murray, Drought and Kory 1964
+/// measured 117 at 0.78 m in men who walked at their free speed.
 [[nodiscard]] double SteadyStepTime(double length_m);
+
+/// Returns the duration of a step with feet that differ in height by `rise_m`. People take slower
+/// steps on stairs and uneven ground.
+[[nodiscard]] double StepTime(double length_m, double rise_m, StepStyle style);
+
+/// Pitches of a foot while it rolls over its ball, as shares of its pitch at toe-off.
+struct RollOff {
+  double heel_rise_swing;  ///< Fraction of the swing of the other foot at which the heel rises.
+  double strike;           ///< When the other foot lands.
+  double strike_rate;      ///< Per half of double support.
+  double state;            ///< In the middle of double support.
+  double state_rate;       ///< Per half of double support.
+  double toe_off_rate;     ///< Per half of double support.
+  double toe_rock;         ///< Angle of the toes about their tip at toe-off.
+  double swing;            ///< In the middle of the swing.
+};
 
 /// The middle of double support in steady walking with the feet `length_m` apart. It determines
 /// pose and velocity at the start and the end of a step. Length 0 is standing.
 ///
+/// Each foot rolls over three rockers (Perry and Burnfield, Gait Analysis): over the heel from
+/// heel-strike until the sole is flat, then the shank over the ankle, then the foot over the ball
+/// from the middle of single support until toe-off. Pitches of the feet around the state:
+///
 ///        heel-strike   state      toe-off
 ///   front      a        0.32 a       0       foot pitch, toes up is positive
-///   rear   -0.42 b     -0.72 b      -b
+///   rear   -0.15 b     -0.40 b      -b      `RollOff`, in straight walking
 struct GaitState {
   double length_m = 0.0;
   /// Time from heel-strike to the state, and from the state to toe-off.
   double half_support_s = 0.0;
+  double step_s = 0.0;             ///< Duration of a steady step between two such states.
   double speed_mps = 0.0;          ///< Forward speed of the pelvis.
   double vigour = 0.0;             ///< min(1, speed / 1.4 m/s); scales motion of the upper body.
   double strike_pitch_rad = 0.0;   ///< a.
   double toe_off_pitch_rad = 0.0;  ///< b, positive.
-  double toe_rock_rad = 0.0;       ///< Angle of the toes about their tip at toe-off.
-  double pelvis_drop_m = 0.0;      ///< Height of the pelvis below standing.
+  RollOff roll_off{};
+  double pelvis_drop_m = 0.0;  ///< Height of the pelvis below standing.
   /// Distance of the pelvis in front of the rear ankle, if that foot is flat.
   double pelvis_ahead_m = 0.0;
   double sway_m = 0.0;  ///< Sideways amplitude of a step between two such states.
+  /// Height of the front foot above the rear foot.
+  double ascent_m = 0.0;
 
   [[nodiscard]] bool standing() const { return length_m == 0.0; }
   [[nodiscard]] double front_pitch_rad() const { return 0.32 * strike_pitch_rad; }
-  [[nodiscard]] double rear_pitch_rad() const { return -0.72 * toe_off_pitch_rad; }
+  [[nodiscard]] double rear_pitch_rad() const { return -roll_off.state * toe_off_pitch_rad; }
   /// Rates of the foot pitches in the state, in rad/s.
   [[nodiscard]] double front_pitch_rate() const;
   [[nodiscard]] double rear_pitch_rate() const;
+  /// Angle of the toes about their tip at toe-off.
+  [[nodiscard]] double toe_rock_rad() const { return roll_off.toe_rock * toe_off_pitch_rad; }
   /// Returns the distance by which raising the ball of the front foot moves it back.
   [[nodiscard]] double front_ball_back_m() const;
 };
 
-/// `rise_m`: height difference of the feet, which takes additional time (kRiseTime_s_m). `flat` is
-/// StepShape::flat.
-[[nodiscard]] GaitState MakeGaitState(double length_m, double rise_m = 0.0, bool flat = false);
-
-/// Additional time per height difference, in seconds per metre.
-inline constexpr double kRiseTime_s_m = 0.6;
+/// `rise_m`: height difference of the feet.
+[[nodiscard]] GaitState MakeGaitState(double length_m, double rise_m = 0.0,
+                                      StepStyle style = StepStyle::kStraight);
 
 }  // namespace stridewire::builtin

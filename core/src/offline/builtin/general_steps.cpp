@@ -90,7 +90,7 @@ void AddClimbingSteps(double direction, RawLibrary& library) {
     shape.start_m.y = direction * climb.start * kRiseM;
     shape.end_m.y = direction * climb.end * kRiseM;
     shape.turn_rad = turn_rad;
-    shape.flat = true;
+    shape.style = StepStyle::kStairs;
     groups.Add(library.skeleton, shape);
   };
   // On stairs the other foot is one tread away; on level ground the length varies more.
@@ -155,6 +155,7 @@ void AddTurningSteps(RawLibrary& library) {
     StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
     shape.start_m.x = start_x;
     shape.turn_rad = turn_rad;
+    shape.style = StepStyle::kGeneral;
     // If the foot turns outwards and lands beside the other, it must not touch the heel of that
     // foot.
     if (end_z == 0.0 && turn_rad > 0.0) shape.end_m.x = OpenSide(turn_rad);
@@ -190,6 +191,7 @@ void AddSideSteps(RawLibrary& library) {
           StepShape shape;
           shape.start_m = DVec3(start_x, 0.0, -start_z);
           shape.end_m = DVec3(end_x, 0.0, end_z);
+          shape.style = StepStyle::kGeneral;
           groups.Add(library.skeleton, shape);
         }
       }

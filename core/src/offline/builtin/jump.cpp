@@ -14,7 +14,7 @@
 #include "offline/builtin/gait_state.h"
 #include "offline/builtin/leg_ik.h"
 #include "offline/builtin/step.h"
-#include "offline/builtin/upper_body.h"
+#include "offline/builtin/upper_body_path.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -12,9 +12,11 @@ namespace stridewire::builtin {
 namespace {
 
 constexpr int kSamples = 161;
-constexpr double kMinKneeRad = 4.0 * kDegree;
-constexpr double kYawRad = 5.0 * kDegree;
-constexpr double kRollRad = 4.0 * kDegree;
+constexpr double kMinKneeRad = 6.0 * kDegree;
+// Amplitudes at 1.4 m/s. Perry and Burnfield, Gait Analysis, state 5 degrees of yaw and 4 of
+// obliquity to each side. These are slightly larger, because blended steps lose a part.
+constexpr double kYawRad = 6.5 * kDegree;
+constexpr double kRollRad = 4.8 * kDegree;
 constexpr double kTiltRad = 1.5 * kDegree;
 
 // All steps through a state must have the same pelvis there. Therefore it depends only on the
@@ -78,15 +80,21 @@ Curve MakeYaw(Foot moving, const StepTiming& timing) {
                 {timing.end_s, -to_right * kYawRad * timing.end.vigour, 0.0}});
 }
 
-// The side of the swinging leg drops soon after toe-off.
+// The weight moves to the front leg until toe-off. Then the side of the swinging leg drops, most at
+// 15 % of the stride after the heel-strike of the other leg, and is level again at its own
+// heel-strike (Perry and Burnfield, Gait Analysis).
 Curve MakeRoll(Foot moving, const StepTiming& timing) {
   const double drop = -SideSign(moving) * kRollRad;
-  const double vigour = std::max(timing.start.vigour, timing.end.vigour);
-  const auto rate = [](const GaitState& state) {
-    return state.standing() ? 0.0 : 0.3 * state.vigour / state.half_support_s;
+  // Slow steps keep more of the obliquity than of the other rotations.
+  const auto share = [](const GaitState& state) {
+    return state.standing() ? 0.0 : 0.35 + 0.65 * state.vigour;
+  };
+  const auto rate = [&](const GaitState& state) {
+    return state.standing() ? 0.0 : share(state) * std::numbers::pi / state.step_s;
   };
   return Curve({{0.0, 0.0, drop * rate(timing.start)},
-                {timing.toe_off_s + 0.2 * timing.swing_s(), drop * vigour, 0.0},
+                {timing.toe_off_s + 0.22 * timing.swing_s(),
+                 drop * std::max(share(timing.start), share(timing.end)), 0.0},
                 {timing.end_s, 0.0, -drop * rate(timing.end)}});
 }
 
@@ -130,8 +138,9 @@ double StateHeight(const GaitState& state, const DVec3& moved_m) {
 DVec3 AsLeft(Foot moving, const DVec3& d) { return {SideSign(moving) * d.x, d.y, d.z}; }
 
 Curve MakeHeight(Foot moving, const StepTiming& timing) {
+  // At the highest point the knee of the standing leg is bent by 5 to 10 degrees.
   const double vigour = 0.5 * (timing.start.vigour + timing.end.vigour);
-  const double top = kStandingHipHeightM - 0.003 - 0.0095 * vigour;
+  const double top = kStandingHipHeightM - 0.003 - 0.002 * vigour;
   const double start = StateHeight(timing.start, AsLeft(moving, timing.shape.start_m));
   const double end = StateHeight(timing.end, AsLeft(moving, timing.shape.end_m));
   const bool level = timing.shape.start_m.y == 0.0 && timing.shape.end_m.y == 0.0;

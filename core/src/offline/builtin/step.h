@@ -5,7 +5,6 @@
 
 #include "offline/builtin/figure.h"
 #include "offline/builtin/step_shape.h"
-#include "offline/builtin/upper_body.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire::builtin {
@@ -22,8 +21,5 @@ namespace stridewire::builtin {
 
 /// Returns the standing pose: the state of length 0 with the root at x = z = 0.
 [[nodiscard]] FigurePose StandingPose();
-
-/// Returns arms, trunk and head of a standing figure.
-[[nodiscard]] UpperBody StandingUpperBody();
 
 }  // namespace stridewire::builtin

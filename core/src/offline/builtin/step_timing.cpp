@@ -13,22 +13,29 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   const double start_rise_m = std::fabs(shape.start_m.y), end_rise_m = std::fabs(shape.end_m.y);
   StepTiming timing;
   timing.shape = shape;
-  timing.start = MakeGaitState(start_length_m, start_rise_m, shape.flat);
-  timing.end = MakeGaitState(end_length_m, end_rise_m, shape.flat);
+  timing.start = MakeGaitState(start_length_m, start_rise_m, shape.style);
+  timing.end = MakeGaitState(end_length_m, end_rise_m, shape.style);
+  timing.start.ascent_m = -shape.start_m.y;
+  timing.end.ascent_m = shape.end_m.y;
   const bool partial = timing.start.standing() || timing.end.standing();
   // Sideways steps and steps on the spot have their own duration, since the leg does not swing
   // through.
   const bool in_place = timing.start.standing() && timing.end.standing();
-  const double level_s = in_place ? 0.62
-                                  : SteadyStepTime(partial ? std::max(start_length_m, end_length_m)
-                                                           : 0.5 * (start_length_m + end_length_m));
-  const double step_s = level_s + kRiseTime_s_m * 0.5 * (start_rise_m + end_rise_m);
+  const double length_m =
+      partial ? std::max(start_length_m, end_length_m) : 0.5 * (start_length_m + end_length_m);
+  const double step_s =
+      in_place ? 0.54 : StepTime(length_m, 0.5 * (start_rise_m + end_rise_m), shape.style);
   // After standing, the weight first moves over the fixed foot. Before standing, the body comes to
   // rest.
-  const double weight_shift_s = in_place ? 0.24 : 0.30;
+  const double weight_shift_s = in_place ? 0.20 : 0.27;
   const double settling_s = 0.12 * step_s + (in_place ? 0.10 : 0.15);
   timing.toe_off_s = timing.start.standing() ? weight_shift_s : timing.start.half_support_s;
-  timing.heel_strike_s = timing.toe_off_s + ToWholeFrames(0.76 * step_s);
+  // The swing of steps from and to standing takes the same share of the step as in slow walking.
+  const auto half_support_s = [&](const GaitState& state) {
+    return state.standing() ? 0.12 * step_s : state.half_support_s;
+  };
+  timing.heel_strike_s = timing.toe_off_s + ToWholeFrames(step_s - half_support_s(timing.start) -
+                                                          half_support_s(timing.end));
   timing.end_s = timing.heel_strike_s +
                  (timing.end.standing() ? ToWholeFrames(settling_s) : timing.end.half_support_s);
   timing.toe_off_s = ToWholeFrames(timing.toe_off_s);
