@@ -74,6 +74,7 @@ using PoseStreams = std::map<AvatarId, std::map<std::uint64_t, std::vector<std::
 PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode) {
   server::Config config = TestConfig(shards);
   config.max_catch_up_ticks = 1000;  // late ticks must not lose time
+  config.idle_motion = false;        // it depends on the tick in which the requests arrive
   config.limits.observer_backlog_ticks = 1000;
   TestServer server(config);
   RawClient client = server.Connect();
@@ -128,7 +129,8 @@ PoseStreams PlayAlone(int avatars, PoseMode mode, const PoseStreams& like) {
   for (int i = 1; i <= avatars; ++i) {
     const auto number = static_cast<AvatarId>(i);
     const protocol::Placement start = Start(number);
-    AvatarSimulation avatar(MakeTestLibrary(), {start.position_m, start.heading_rad});
+    AvatarSimulation avatar(MakeTestLibrary(), {start.position_m, start.heading_rad},
+                            {.idle_motion = false});
     const auto step = [&](double length_m) {
       return MovementRequest{1, StepRequest{.length_m = length_m}};
     };

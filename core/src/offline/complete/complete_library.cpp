@@ -235,6 +235,17 @@ class LackingList {
   std::vector<Entry> entries_;
 };
 
+// Returns the foot that moves in all steps of a library, or nothing if both move or none does.
+std::optional<Foot> OnlyFootOf(const RawLibrary& library) {
+  std::array<bool, 2> moves{};
+  for (const RawGroup& group : library.groups) {
+    if (!IsStep(group.kind) || group.examples.empty()) continue;
+    moves[static_cast<std::size_t>(MovingFoot(group.kind))] = true;
+  }
+  if (moves[0] == moves[1]) return std::nullopt;
+  return moves[0] ? Foot::kLeft : Foot::kRight;
+}
+
 LegRig RigOf(const RawLibrary& library) {
   std::vector<const Clip*> clips;
   for (const RawGroup& group : library.groups) {
@@ -289,6 +300,7 @@ std::string Joined(const std::vector<std::string>& parts) {
 Completion CompleteLibrary(RawLibrary& library) {
   Completion completion;
   if (library.groups.empty()) return completion;
+  completion.only_foot = OnlyFootOf(library);
   std::optional<StrideModel> left = complete::MeasureStride(library, Foot::kLeft);
   std::optional<StrideModel> right = complete::MeasureStride(library, Foot::kRight);
   const bool has_strides = left && right;
@@ -359,6 +371,12 @@ std::vector<std::string> DescribeCompletion(const Completion& completion) {
         "The stand pose was composed from the mean posture of the steps, because in "
         "the stillest captured pose " +
         completion.stand_reason + ".");
+  }
+  if (completion.only_foot) {
+    sentences.push_back(
+        Text("They contain steps of the %s foot only: add the option --mirror to the build to use "
+             "their mirror images for the other foot.",
+             *completion.only_foot == Foot::kLeft ? "left" : "right"));
   }
   if (completion.has_generic_strides) {
     sentences.emplace_back(

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct Completion {
   /// The captures contain no level stride straight ahead, so that the generated steps follow those
   /// of the generated figure of the library `builtin`.
   bool has_generic_strides = false;
+  std::optional<Foot> only_foot;  ///< The foot that moves in all captured steps, if it is one.
   std::string failure;  ///< Why nothing could be completed although something is lacking, or empty.
 };
 

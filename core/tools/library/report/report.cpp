@@ -223,8 +223,11 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
              {}};
   for (const Walk& walk : DemonstrationWalks(*library)) {
     auto figure = WalkFigure(library, walk.name, walk.caption, walk.requests);
-    if (!figure) return std::unexpected(figure.error());
-    walks.figures.push_back(*std::move(figure));
+    if (figure) {
+      walks.figures.push_back(*std::move(figure));
+    } else {  // The library lacks a movement that this walk needs.
+      walks.text += " Not possible: " + walk.name + " (" + Describe(figure.error()) + ").";
+    }
   }
   if (!walks.figures.empty()) parts.insert(parts.begin(), std::move(walks));
 
