@@ -18,7 +18,7 @@ class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
       : row_floats_(static_cast<std::size_t>(layout.row_floats)),
-        slot_count_(std::min(kMaxSlots, std::bit_floor(rows_.size() / row_floats_))) {
+        slot_count_(std::min(kMaxSlots, std::bit_floor(kRowsFloats / row_floats_))) {
     Clear();
   }
 
@@ -33,10 +33,11 @@ class GridCache {
   // This is enough for all points of most movements. If rows have the maximum length, only the four
   // points around a time fit.
   static constexpr std::size_t kMaxSlots = 32;
+  static constexpr std::size_t kRowsFloats = 4 * kMaxRowFloats;
   std::size_t row_floats_;
-  std::size_t slot_count_;                     // Number of slots, a power of two.
-  std::array<float, 4 * kMaxRowFloats> rows_;  // Point p is in slot p % slot_count_.
-  std::array<int, kMaxSlots> points_;          // [slot]: grid point stored in the slot, or -1.
+  std::size_t slot_count_;               // Number of slots, a power of two.
+  std::array<float, kRowsFloats> rows_;  // Point p is in slot p % slot_count_.
+  std::array<int, kMaxSlots> points_;    // [slot]: grid point stored in the slot, or -1.
 };
 
 /// Evaluates the blended pose at a grid point. Never allocates.
