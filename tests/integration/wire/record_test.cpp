@@ -128,10 +128,10 @@ std::optional<Seen> RecordOnce(RawClient& game, std::uint16_t port, protocol::Wo
 
 // Starts a server without idle motion, which differs between avatars.
 test::ChildProcess StartServer(int shards) {
-  return test::ChildProcess(STRIDEWIRE_STRIDEWIRED,
-                            {"--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--shards",
-                             std::to_string(shards), "--max-catch-up-ticks", "1000",
-                             "--idle-motion=false"});
+  return test::ChildProcess(
+      STRIDEWIRE_STRIDEWIRED,
+      {"--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--shards", std::to_string(shards),
+       "--max-catch-up-ticks", "1000", "--idle-motion=false"});
 }
 
 class RecordTest : public testing::TestWithParam<int> {};
