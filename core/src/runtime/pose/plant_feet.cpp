@@ -151,9 +151,9 @@ FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Mo
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement) {
-  // A standing foot that descends faster than this would sink into the ground before it stops. A
-  // real foot is stopped by the ground.
-  constexpr double kMaxDescentM_s = 0.5;
+  // A standing foot that descends faster than this, in m/s, would sink into the ground. The ground
+  // stops a real foot.
+  constexpr double kMaxDescentSpeed = 0.5;
   FootPlan& plan = movement.feet;
   const double per_s = 1.0 / kBlendStepS;
   for (std::size_t f = 0; f < 2; ++f) {
@@ -178,7 +178,7 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
       const double velocity_m_s =
           per_s * (blended[1][f].ball_m.y - blended[0][f].ball_m.y + before[0].feet[f].offset_m.y -
                    before[1].feet[f].offset_m.y);
-      residual.offset_m_s.y += std::max(0.0, -kMaxDescentM_s - velocity_m_s);
+      residual.offset_m_s.y += std::max(0.0, -kMaxDescentSpeed - velocity_m_s);
     } else {
       residual.over_s = trajectory.land_s - movement.start_offset_s;
     }
