@@ -28,9 +28,9 @@ constexpr int kSettleCells = 4;
 // Fast enough for sway of 0.5 Hz. Between grid points the soles move by less than 0.01 mm.
 constexpr int kIdleCellsPerS = 8;
 
-// Amplitudes. The pelvis of a person who stands quietly sways by a few millimetres, more forward
-// than sideways, at frequencies below 0.5 Hz (Winter, "Human balance and posture control during
-// standing and walking", 1995). Adults breathe about 15 times per minute.
+// Amplitudes of the sway of the pelvis and of breathing. While a person stands quietly, the pelvis
+// sways by a few millimetres, more forward than sideways, below 0.5 Hz (Winter, "Human balance and
+// posture control during standing and walking", 1995). Adults breathe about 15 times per minute.
 constexpr double kSwayForwardM = 0.004;
 constexpr double kSwaySidewaysM = 0.0025;
 constexpr int kBreathsPerLoop = 10;  // 0.25 Hz
