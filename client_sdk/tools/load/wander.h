@@ -28,7 +28,7 @@ class SmallRandom {
 struct WanderPlan {
   /// Movements to request. The first one is a step or jump, never a stand.
   std::vector<Movement> movements;
-  /// Time until the next plan, in seconds. It is longer than these movements take.
+  /// Time until the next plan, in seconds. It is longer than the duration of the movements.
   double period_s = 0.0;
 };
 

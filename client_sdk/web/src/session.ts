@@ -578,7 +578,7 @@ export class Session {
   private pump(): void {
     if (this.stateNow !== 'ready') return;
 
-    // First the commands that the server may have received already, in order.
+    // Resend the commands that the server may have received already, before any new command.
     while (this.resendFrom !== 0n && this.pending < maxOutputBytes) {
       let next: Command | undefined;
       for (const [seq, command] of this.unanswered) {  // Commands are sent again in order of seq.

@@ -58,7 +58,7 @@ struct Config {
   bool allow_insecure = false;
   /// True: when a client joins a world that the file does not name, the server creates it.
   bool open_worlds = true;
-  bool persistent = false;  ///< WorldConfig::persistent of worlds that the file does not name.
+  bool persistent = false;  ///< WorldConfig::persistent for worlds that the file does not name.
   std::string log_level = "info";
   double drain_timeout_s = 5.0;
   Limits limits;

@@ -39,11 +39,11 @@ struct LayerCut {
   bool is_looping = true;
 };
 
-/// Cuts a layer out of a capture. To close a loop, its last kLoopBlendS (at most a quarter) are
-/// blended into its beginning, which shortens the loop by that time. The mask is UpperBodyMask().
-/// Errors, with details in `where`: kShapeMismatch if the joints differ from the skeleton,
-/// kInvalidArgument for an invalid name, kOutOfRange for times outside the capture or less than 0.1
-/// s.
+/// Cuts a layer out of a capture. The mask is UpperBodyMask(). To close a loop, its end is blended
+/// into its beginning. The blend lasts kLoopBlendS, or a quarter of the cut if that is shorter, and
+/// shortens the loop by this time. Errors, with details in `where`: kShapeMismatch if the joints
+/// differ from the skeleton, kInvalidArgument for an invalid name, kOutOfRange for times outside
+/// the capture or a cut shorter than 0.1 s.
 [[nodiscard]] Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton,
                                           const LayerCut& cut);
 

@@ -22,8 +22,8 @@ class FeetLeveller {
   FeetLeveller(const Skeleton& skeleton, ConstPoseSpan any_pose, const std::array<Vec3, 2>& hinges,
                const std::array<double, 2>& ball_height_m);
 
-  /// Levels a step or a jump by its `ground_m`, and measures the parameters of a step again.
-  /// `names` are their names.
+  /// Moves the feet of a step or a jump by -`example.ground_m`, and measures the parameters `names`
+  /// of a step again.
   void Level(ExtractedExample& example, std::span<const ParameterName> names) const;
 
   /// Puts both balls of a standing pose at rest. Leaves the pose unchanged if a foot is too far

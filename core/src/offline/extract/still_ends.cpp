@@ -9,8 +9,8 @@ namespace stridewire {
 namespace {
 
 constexpr double kStillM = 0.005;  // Joints of a still pose move at most this far per frame.
-// At a jump, a joint moves at least kJumpM, and at least kJumpFactor times as far as in the next
-// frame.
+// The pose jumps between two frames if a joint moves at least kJumpM, and at least kJumpFactor
+// times as far as from the second of these frames to the next.
 constexpr double kJumpM = 0.05;
 constexpr double kJumpFactor = 4.0;
 

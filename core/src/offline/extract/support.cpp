@@ -149,13 +149,15 @@ std::vector<StandingSpan> StandingSpans(const FootContacts& contacts) {
   return spans;
 }
 
-// Returns true if the figure gets from one span to the next in the air without falling freely.
+// Returns true if the figure is in the air between two spans but does not fall freely: something
+// that was not captured carries it.
 bool IsHeldBetween(const BodyTracks& tracks, const StandingSpan& from, const StandingSpan& to) {
   const FrameRange flight{from.frames.end, to.frames.begin};
   return flight.size() >= kHeldMinS * tracks.fps && !FallsFreely(tracks, flight);
 }
 
-// Removes the contacts of feet that hang in the air between two flights without a fall.
+// Removes contacts of feet that hang in the air. Such contacts are higher than those before and
+// after them, and the figure is carried on the way there and back.
 void RemoveHanging(const BodyTracks& tracks, FootContacts& contacts) {
   const std::vector<StandingSpan> spans = StandingSpans(contacts);
   for (std::size_t k = 1; k + 1 < spans.size(); ++k) {

@@ -44,9 +44,9 @@ constexpr double kMaxRootSinkM = 0.3;
 // Largest sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
 
-// Standing soles may be this far above and below the ground, because captures do not tell exactly
-// where a foot ends. Beyond, the height of the foot is corrected, but by at most kMaxLevelM: larger
-// differences are not errors of the blend.
+// Standing soles may be this far above and below the ground, because the height of the sole is not
+// known exactly from a capture. If the distance is larger, the height of the foot is corrected by
+// up to kMaxLevelM. Larger differences are not errors of the blend.
 constexpr double kMaxHoverM = 0.006;
 constexpr double kMaxSinkM = 0.003;
 constexpr double kMaxLevelM = 0.05;
@@ -308,7 +308,7 @@ class Planner {
     const double settled = 1.0 - EaseOut(since_s / movement_.ease_out_s);
     const double height_m = start_m + settled * (settled_m - start_m);
     const double raise_m = Levelling(sampler_.LowestSole(kRelease, moving) + height_m - ground_m);
-    // A foot that stands for longer reaches this height before it rolls up: meet halfway.
+    // After the blend-in, the foot reaches this height before its heel rises: correct it by half.
     if (raise_m < 0.0 && since_s > movement_.ease_out_s) return settled_m + 0.5 * raise_m;
     return settled_m + raise_m / std::max(settled, kLeastSettled);
   }

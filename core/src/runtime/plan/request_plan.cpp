@@ -31,8 +31,8 @@ constexpr double kStraightPreferenceM = 0.15;
 // Extra cost of a group whose steps were generated because the captures lack them. Captured steps
 // are preferred if they fit nearly as well.
 constexpr double kCompletedCostM = 0.02;
-// Beside such groups, captured groups cost more where no example is near. With few examples and
-// many parameters, most of the hull is far from all of them, and blends there resemble none.
+// If a library has such groups, its captured groups cost more far from their examples. With few
+// examples and many parameters, most of the hull is far from all of them and yields poor blends.
 constexpr double kNearExampleM = 0.15;
 constexpr double kFarExampleWeight = 0.5;
 // Extra cost per metre outside the hull of the examples, even where requests may extrapolate.

@@ -312,7 +312,7 @@ class StepPlanner {
     const double natural_rad = NaturalTurn(group, plan->applied);
     const double turn_rad =
         std::clamp(wanted_rad, natural_rad - kMaxWalkTurnRad, natural_rad + kMaxWalkTurnRad);
-    // A library with climbing steps need not land on another height with a level step.
+    // If the library has climbing steps, a level step must not land at another height.
     const double error_y = applied_or(ParameterName::kEndY, 0.0) - GroundRise(wanted.y);
     if (is_strict_ && profile_.has_climbs && std::fabs(error_y) > kMaxErrorHeightM) {
       return std::nullopt;

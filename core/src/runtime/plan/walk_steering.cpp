@@ -165,7 +165,7 @@ void WalkSteering::PassWaypoints(std::size_t& next) const {
   }
 }
 
-// Returns the length of the way through the remaining waypoints.
+// Returns the length of the path through the remaining waypoints.
 double WalkSteering::DistanceM(DVec3 from, std::size_t next_waypoint, const DVec3& to) const {
   double distance_m = 0.0;
   for (std::size_t i = next_waypoint; i < walk_.waypoints_m.size(); ++i) {
@@ -177,7 +177,7 @@ double WalkSteering::DistanceM(DVec3 from, std::size_t next_waypoint, const DVec
 
 double WalkSteering::EffortM(Foot moved, std::size_t next_waypoint) const {
   const Body body = BodyOver(moved);
-  // Where the body is over this foot at the goal.
+  // Position of the body at the goal, derived from the footprint of this foot like `body`.
   const DVec3 goal_m = GoalPrint(moved).position_m -
                        RotateYaw(goal_.heading_rad, FootOffset(moved, profile_.stand_m));
   const double distance_m = DistanceM(body.position_m, next_waypoint, goal_m);

@@ -40,8 +40,8 @@ class WalkSteering {
   /// distance through the waypoints plus the turns, where a radian counts as 0.3 m. Close to the
   /// goal, it is at most the effort of stepping sideways.
   [[nodiscard]] double EffortM(Foot moved, std::size_t next_waypoint) const;
-  /// Returns the distance between the positions of the body over either foot. After a step it is
-  /// the length of the way that the body takes with this step.
+  /// Returns the distance between the positions of the body that are derived from the left and from
+  /// the right foot. After a step, this is how far the body moves in that step.
   [[nodiscard]] double BodiesApartM() const;
 
   /// Returns the feet that may step next, the preferred foot first. During a walk the feet
@@ -60,7 +60,7 @@ class WalkSteering {
   [[nodiscard]] WalkStep Pivot(Foot moving, double turn_rad) const;
   /// Returns true if one long step of this foot can reach the goal.
   [[nodiscard]] bool IsGoalNear(Foot moving, std::size_t next_waypoint) const;
-  /// Returns the step of this foot to its place at the goal.
+  /// Returns the step that puts this foot on its footprint at the goal.
   [[nodiscard]] WalkStep StepToGoal(Foot moving) const;
 
   /// Returns the footprint of a foot at the goal.
@@ -97,8 +97,8 @@ class WalkSteering {
   const WalkRequest& walk_;
   const WalkStance& stance_;
   Body goal_;
-  // Where the body walks to before the last step. It differs from goal_ if the library stands in a
-  // stride: the rear foot is then at its place, and the last step moves the front foot ahead.
+  // Target of the body before the last step. It differs from goal_ if the library stands in a
+  // stride: the rear foot is then on its footprint, and the last step moves the front foot ahead.
   Body approach_;
   std::array<Foot, 2> feet_{};
 };

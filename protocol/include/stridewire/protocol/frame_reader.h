@@ -27,9 +27,9 @@ class FrameReader {
   explicit FrameReader(Sender sender, const FrameLimits& limits = {});
 
   /// Consumes bytes from the front of `bytes` up to the end of one frame. Returns an empty optional
-  /// if the frame is incomplete. The view is valid until the next call and as long as the memory of
-  /// `bytes`, because a complete and aligned frame is not copied. Fails with the errors of
-  /// ReadFrameHeader. After an error every call returns the same error.
+  /// if the frame is incomplete. The view is valid until the next call. It may refer to the memory
+  /// of `bytes`, because frames that are complete and aligned there are not copied. Fails with the
+  /// errors of ReadFrameHeader. After an error every call returns the same error.
   [[nodiscard]] Expected<std::optional<FrameView>> Next(std::span<const std::byte>& bytes);
 
   /// Sets the caps for all following frames, for example after the handshake.

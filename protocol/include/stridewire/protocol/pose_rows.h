@@ -81,8 +81,8 @@ class PoseBatchComposer {
   PoseBatchComposer(PoseBatchComposer&&) noexcept;
   PoseBatchComposer& operator=(PoseBatchComposer&&) noexcept;
 
-  /// Returns how many of the first `picked` rows fit in one frame. `picked` has ascending row
-  /// indices.
+  /// Returns how many rows fit in one frame, starting with the first of `picked`. `picked` contains
+  /// row indices in ascending order.
   [[nodiscard]] std::size_t CountThatFit(const PoseRows& rows,
                                          std::span<const std::uint32_t> picked) const;
 
