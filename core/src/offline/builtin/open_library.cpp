@@ -7,8 +7,8 @@ namespace stridewire {
 
 Expected<std::shared_ptr<const MotionLibrary>> OpenLibrary(std::string_view name) {
   if (name != "builtin") return MotionLibrary::Open(name);
-  LibraryBuilder builder;
-  return builder.Build(GenerateBuiltinLibrary());
+  static const auto builtin = LibraryBuilder().Build(GenerateBuiltinLibrary());
+  return builtin;
 }
 
 }  // namespace stridewire
