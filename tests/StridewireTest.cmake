@@ -1,7 +1,9 @@
 # stridewire_test(NAME [THREADS] [RUN_SERIAL] LABEL <unit|integration|fuzz> SOURCES source...
 #                 [SKIP_UNITY_BUILD source...] LIBRARIES library...)
 #
-# Adds a GoogleTest program whose tests ctest runs one by one.
+# Adds a GoogleTest program whose tests ctest runs one by one. With sanitizers ctest runs each half
+# of the tests in one process, because the start of a process and the generated library take up to
+# three seconds; GTEST_FILTER selects tests.
 #   THREADS            the code under test has several threads: also built for the thread sanitizer
 #   RUN_SERIAL         no other test runs at the same time
 #   SKIP_UNITY_BUILD   sources whose local names clash with those of other sources
@@ -27,6 +29,15 @@ function(stridewire_test name)
   endif()
   if(STRIDEWIRE_SANITIZE MATCHES thread AND NOT ARG_THREADS)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    return()
+  endif()
+  if(STRIDEWIRE_SANITIZE)
+    foreach(half IN ITEMS 0 1)
+      add_test(NAME ${name}.${half} COMMAND ${name})
+      set_tests_properties(${name}.${half} PROPERTIES
+        LABELS ${ARG_LABEL} TIMEOUT 1200 RUN_SERIAL ${ARG_RUN_SERIAL}
+        ENVIRONMENT "GTEST_TOTAL_SHARDS=2;GTEST_SHARD_INDEX=${half}")
+    endforeach()
     return()
   endif()
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST

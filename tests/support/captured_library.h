@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
@@ -63,10 +64,14 @@ inline std::shared_ptr<const MotionLibrary> BuildFromTakes(
   return builder.Build(AssembleTakes(takes, {.mirror = true})).value();
 }
 
-/// Returns the library of some subjects, or the generated library if there are none.
+/// Returns the library of some subjects, or the generated library if there are none. A process
+/// builds each library only once.
 inline std::shared_ptr<const MotionLibrary> LibraryOf(const std::vector<std::string>& subjects) {
   if (subjects.empty()) return OpenLibrary("builtin").value();
-  return BuildFromTakes(TakesOf(subjects));
+  static std::map<std::vector<std::string>, std::shared_ptr<const MotionLibrary>> built;
+  std::shared_ptr<const MotionLibrary>& library = built[subjects];
+  if (!library) library = BuildFromTakes(TakesOf(subjects));
+  return library;
 }
 
 /// Same, with every movement as captured, without selection, averaging or smoothing. A reference
