@@ -213,6 +213,28 @@ double LiftOutOfGround(const FootTrajectory& trajectory, double time_s, const Le
   return lift_m;
 }
 
+// Returns by how much the root has to be lower so that a leg reaches its ankle target. `blended_m`
+// is the distance from hip to ankle in the blended pose, `reach` the vector from hip to target.
+double LowerFor(const LegRig::Side& side, double blended_m, const DVec3& reach) {
+  const double length_m = static_cast<double>(side.thigh_m) + side.shank_m;
+  const double longest_m = std::min(SmoothMax(blended_m, kEasyExtension * length_m, kSoftM),
+                                    kLongestExtension * length_m);
+  const double free_m =
+      std::min(std::max(blended_m, kFreeExtension * length_m), longest_m - kLeastRoom * length_m);
+  // The leg has its full length up to `free_m` and approaches `longest_m` beyond.
+  const double distance_m = glm::length(reach);
+  const double excess_m = std::max(distance_m - free_m, 0.0);
+  const double allowed_m =
+      distance_m - excess_m + excess_m / std::hypot(1.0, excess_m / (longest_m - free_m));
+  // Lowering the root cannot reach a foot that is too far away horizontally. Limit how far it goes
+  // down for such a foot.
+  const double deepest_m = 0.5 * length_m;
+  const double flat_squared = reach.x * reach.x + reach.z * reach.z;
+  const double drop_m =
+      std::sqrt(std::max(allowed_m * allowed_m - flat_squared, deepest_m * deepest_m));
+  return std::max(0.0, -reach.y - drop_m);
+}
+
 }  // namespace
 
 void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
@@ -254,26 +276,18 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
   }
 
   // Lower the root until both legs can reach their ankle targets.
-  double lower_m = 0.0;
+  std::array<double, 2> lowers_m;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const Side& side = sides[static_cast<std::size_t>(foot)];
     const LegRig::Side& bones = rig.side(foot);
     const Vec3 hip = side.leg.positions_m[static_cast<std::size_t>(bones.hip)];
     const Vec3 blended = side.leg.positions_m[static_cast<std::size_t>(bones.ankle)] - hip;
-    const double length_m = static_cast<double>(bones.thigh_m) + bones.shank_m;
-    const double blended_m = std::sqrt(glm::dot(blended, blended));
-    const double allowed_m = std::min(SmoothMax(blended_m, kEasyExtension * length_m, kSoftM),
-                                      kLongestExtension * length_m);
-    const DVec3 reach = side.ankle_m - (root + shift + DVec3(hip));
-    const double flat_squared = reach.x * reach.x + reach.z * reach.z;
-    const double drop_squared = allowed_m * allowed_m - flat_squared;
-    // Lowering the root cannot reach a foot that is too far away horizontally. Limit how far it
-    // goes down for such a foot.
-    const double deepest_m = 0.5 * length_m;
-    const double drop_m = std::sqrt(std::max(drop_squared, deepest_m * deepest_m));
-    lower_m = SmoothMax(lower_m, -reach.y - drop_m, kSoftLowerM);
+    lowers_m[static_cast<std::size_t>(foot)] = LowerFor(
+        bones, std::sqrt(glm::dot(blended, blended)), side.ankle_m - (root + shift + DVec3(hip)));
   }
-  shift.y -= lower_m;
+  const double apart_m = lowers_m[0] - lowers_m[1];
+  shift.y -= 0.5 * (lowers_m[0] + lowers_m[1] +
+                    std::sqrt(apart_m * apart_m + kLowerOverlap * lowers_m[0] * lowers_m[1]));
 
   pose.root_position_m = Vec3(root + shift);
   const DVec3 moved = DVec3(pose.root_position_m);

@@ -310,6 +310,24 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarg
   });
 }
 
+// Returns by how much the root has to be lower so that a leg reaches its ankle target. `blended_m`
+// is the distance from hip to ankle in the blended pose, `reach` the vector from hip to target.
+HWY_INLINE Float LowerFor(float length_m, Float blended_m, SoaVec3 reach) {
+  const auto part = [&](double fraction)
+                        HWY_ATTR { return Float(static_cast<float>(fraction) * length_m); };
+  const Float longest = Min(SmoothMax(blended_m, part(kEasyExtension), static_cast<float>(kSoftM)),
+                            part(kLongestExtension));
+  const Float free = Min(Max(blended_m, part(kFreeExtension)), longest - part(kLeastRoom));
+  const Float flat_squared = reach.x * reach.x + reach.z * reach.z;
+  const Float distance = Sqrt(flat_squared + reach.y * reach.y);
+  const Float excess = Max(distance - free, Float(0.0f));
+  const Float share = excess / (longest - free);
+  const Float allowed = distance - excess + excess / Sqrt(Float(1.0f) + share * share);
+  const Float deepest = part(0.5);
+  const Float drop = Sqrt(Max(allowed * allowed - flat_squared, deepest * deepest));
+  return Max(Float(0.0f), -reach.y - drop);
+}
+
 // Plants the feet of one vector of poses, starting at `lane`.
 void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane, JointMap joints) {
   const DoubleTag d;
@@ -396,23 +414,16 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   shift =
       AddRootResidual<Float>(shift, common, common.root_residual, common.root_residual_velocity);
 
-  Float lower = 0.0f;
-  for (std::size_t f = 0; f < 2; ++f) {
-    const LegRig::Bones& bones = rig.bones[f];
+  Float lowers[2];
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const SoaVec3 hip = legs[f].positions[bones.hip];
     const SoaVec3 blended = legs[f].positions[bones.ankle] - hip;
-    const float length = bones.thigh_m + bones.shank_m;
-    const Float allowed = Min(
-        SmoothMax(Sqrt(Dot(blended, blended)), Float(static_cast<float>(kEasyExtension) * length),
-                  static_cast<float>(kSoftM)),
-        Float(static_cast<float>(kLongestExtension) * length));
-    const SoaVec3 reach = ankles[f] - (root + shift + hip);
-    const Float drop_squared = allowed * allowed - (reach.x * reach.x + reach.z * reach.z);
-    const float deepest = 0.5f * length;
-    const Float drop = Sqrt(Max(drop_squared, Float(deepest * deepest)));
-    lower = SmoothMax(lower, -reach.y - drop, static_cast<float>(kSoftLowerM));
-  }
-  shift.y = shift.y - lower;
+    lowers[f] = LowerFor(bones.thigh_m + bones.shank_m, Sqrt(Dot(blended, blended)),
+                         ankles[f] - (root + shift + hip));
+  });
+  const Float apart = lowers[0] - lowers[1];
+  const Float overlap = Float(static_cast<float>(kLowerOverlap)) * lowers[0] * lowers[1];
+  shift.y = shift.y - Float(0.5f) * (lowers[0] + lowers[1] + Sqrt(apart * apart + overlap));
 
   // The pose stores the root as floats in world space. Round the root first, so that the legs are
   // solved from the root position that is displayed.

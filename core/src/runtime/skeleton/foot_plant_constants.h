@@ -8,11 +8,18 @@ namespace stridewire {
 // Planting may extend a leg to kEasyExtension of its length, or as far as the blended pose extends
 // it, whichever is longer, but never beyond kLongestExtension of its length.
 inline constexpr double kEasyExtension = 0.995;
-inline constexpr double kLongestExtension = 0.999;
+inline constexpr double kLongestExtension = 0.9995;
+// Planting lowers the root if a leg would exceed that limit. A leg approaches the limit gradually.
+// It keeps its length up to kFreeExtension or, if longer, the extension of the blended pose. That
+// length and the limit are at least kLeastRoom apart. All are fractions of the leg's length.
+inline constexpr double kFreeExtension = 0.965;
+inline constexpr double kLeastRoom = 0.001;
+// If the legs need lowerings a and b, the root is lowered by the larger one, smoothed with
+// kLowerOverlap * a * b.
+inline constexpr double kLowerOverlap = 0.1;
 // Smoothing distances of SmoothMax. They keep the root and the feet from changing speed abruptly
 // when a limit becomes active.
 inline constexpr double kSoftM = 0.002;
-inline constexpr double kSoftLowerM = 0.01;
 inline constexpr double kSoftGroundM = 0.006;
 // Within kNearPrintM of a footprint (horizontally), soles are lifted fully out of its ground plane.
 // The lift fades to zero at kFarFromPrintM.
