@@ -291,7 +291,7 @@ TEST(BuiltinLibrary, StepsJoinContinuously) {
       for (std::size_t j = 0; j < static_cast<std::size_t>(left.clip.joint_count); ++j) {
         const DVec3 before = JointVelocity(left, j, true), after = JointVelocity(right, j, false);
         // The velocities are estimated over 25 ms, in which a knee accelerates.
-        EXPECT_LE(glm::length(before - after), 30.0) << Library().skeleton.joints[j].name;
+        EXPECT_LE(glm::length(before - after), 25.0) << Library().skeleton.joints[j].name;
       }
     }
   }
