@@ -70,11 +70,6 @@ void HighestWithin(benchmark::State& state) {
 }
 BENCHMARK(HighestWithin)->Name("terrain/highest_within_15_cm");
 
-void LowestWithin(benchmark::State& state) {
-  Ask(state, [](const Terrain& t, double x, double z) { return t.LowestWithin(x, z, 0.15); });
-}
-BENCHMARK(LowestWithin)->Name("terrain/lowest_within_15_cm");
-
 void MakeLargest(benchmark::State& state) {
   const TerrainData data = MakeGround(kMaxTerrainColumns, 0.25, int{kMaxTerrainBoxes});
   for (auto _ : state) {

@@ -93,12 +93,6 @@ class Terrain {
   /// the disc. A radius <= 0 means a point. The time grows with the square of the radius.
   [[nodiscard]] double HighestWithin(double x_m, double z_m, double radius_m) const;
 
-  /// Returns a lower bound for the height of the ground in a disc. Ground that is covered by boxes
-  /// does not count, so the seam between two adjacent boxes is not a gap. The result is exact for
-  /// boxes and for y = 0 outside the field if at most 32 boxes intersect the disc. Otherwise, and
-  /// for the field, whose minimum is taken over squares, it may be too low.
-  [[nodiscard]] double LowestWithin(double x_m, double z_m, double radius_m) const;
-
  private:
   /// Cells [first, last] of a grid along both axes. Empty if `first` > `last`.
   struct CellRange {
@@ -118,10 +112,6 @@ class Terrain {
     double h00, h10, h01, h11;
     double s, t;
   };
-  struct Extremes {
-    double lowest;
-    double highest;
-  };
 
   explicit Terrain(TerrainData data) : data_(std::move(data)) {}
 
@@ -131,7 +121,7 @@ class Terrain {
   [[nodiscard]] bool InField(double x_m, double z_m) const;
   [[nodiscard]] Patch PatchAt(double x_m, double z_m) const;  ///< The point must be in the field.
   [[nodiscard]] double FieldHeight(double x_m, double z_m) const;
-  [[nodiscard]] Extremes FieldExtremes(const Rectangle& area) const;
+  [[nodiscard]] double HighestInField(const Rectangle& area) const;
   /// Returns the index of the highest box that contains the point, or -1.
   [[nodiscard]] std::int64_t HighestBoxAt(double x_m, double z_m) const;
   /// Calls `visit(box)` once for each box that may intersect `area`.

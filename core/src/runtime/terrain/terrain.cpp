@@ -19,9 +19,6 @@ constexpr std::size_t kFewBoxes = 16;
 constexpr double kMinIndexedM = 1e-6;
 constexpr std::size_t kMaxIndexEntries = std::size_t{4} << 20;
 
-// LowestWithin considers at most this many boxes. The header documents the number.
-constexpr std::size_t kMaxLocalBoxes = 32;
-
 bool IsWithin(double value, double limit) { return value >= -limit && value <= limit; }
 
 Status CheckPoint(const GroundPoint& point, const std::string& where) {
@@ -284,39 +281,35 @@ double Terrain::FieldHeight(double x, double z) const {
   return near * (1.0 - p.t) + far * p.t;
 }
 
-// `area` must be inside the field. A bilinear patch has its extremes over an axis-parallel
-// rectangle at the corners of that rectangle. So it suffices to sample the corners of the part of
-// `area` in each cell, that is, the points of the grid formed by the area's borders and the sample
-// lines between them.
-Terrain::Extremes Terrain::FieldExtremes(const Rectangle& area) const {
+// `area` must be inside the field. Over an axis-parallel rectangle, a bilinear patch is highest at
+// a corner of that rectangle. So it suffices to sample the corners of the part of `area` in each
+// cell, that is, the points of the grid formed by the area's borders and the sample lines between
+// them.
+double Terrain::HighestInField(const Rectangle& area) const {
   const HeightField& field = *data_.height_field;
   const auto line = [&](double origin, std::int32_t l) { return origin + field.cell_m * l; };
   const auto first = [&](double from, double origin) {
     return static_cast<std::int32_t>((from - origin) / field.cell_m) + 1;
   };
-  Extremes found{kMaxTerrainHeightM, -kMaxTerrainHeightM};
-  const auto look = [&](double x, double z) {
-    const double height = FieldHeight(x, z);
-    found.lowest = std::min(found.lowest, height);
-    found.highest = std::max(found.highest, height);
-  };
-  const auto look_along_x = [&](double z) {
-    look(area.min.x, z);
+  double highest = -kMaxTerrainHeightM;
+  const auto sample = [&](double x, double z) { highest = std::max(highest, FieldHeight(x, z)); };
+  const auto sample_along_x = [&](double z) {
+    sample(area.min.x, z);
     for (std::int32_t i = first(area.min.x, field.origin_m.x); i < field.columns; ++i) {
       const double x = line(field.origin_m.x, i);
       if (x >= area.max.x) break;
-      look(x, z);
+      sample(x, z);
     }
-    look(area.max.x, z);
+    sample(area.max.x, z);
   };
-  look_along_x(area.min.z);
+  sample_along_x(area.min.z);
   for (std::int32_t j = first(area.min.z, field.origin_m.z); j < field.rows; ++j) {
     const double z = line(field.origin_m.z, j);
     if (z >= area.max.z) break;
-    look_along_x(z);
+    sample_along_x(z);
   }
-  look_along_x(area.max.z);
-  return found;
+  sample_along_x(area.max.z);
+  return highest;
 }
 
 double Terrain::HeightAt(double x, double z) const {
@@ -351,10 +344,9 @@ double Terrain::HighestWithin(double x, double z, double radius) const {
     is_all_field = around.min.x >= origin.x && around.max.x <= field_max_m_.x &&
                    around.min.z >= origin.z && around.max.z <= field_max_m_.z;
     if (DistanceSquared(origin, field_max_m_, x, z) <= radius * radius) {
-      highest = FieldExtremes({{std::max(around.min.x, origin.x), std::max(around.min.z, origin.z)},
-                               {std::min(around.max.x, field_max_m_.x),
-                                std::min(around.max.z, field_max_m_.z)}})
-                    .highest;
+      highest = HighestInField(
+          {{std::max(around.min.x, origin.x), std::max(around.min.z, origin.z)},
+           {std::min(around.max.x, field_max_m_.x), std::min(around.max.z, field_max_m_.z)}});
     }
   }
   if (!is_all_field) highest = std::max(highest, 0.0);
@@ -364,76 +356,6 @@ double Terrain::HighestWithin(double x, double z, double radius) const {
     }
   });
   return highest;
-}
-
-// The borders of the boxes and of the field divide the square around the disc into rectangles. The
-// height of the highest box is constant in each rectangle. So the minimum of max(field, top) over a
-// rectangle is max(minimum of the field, top).
-double Terrain::LowestWithin(double x, double z, double radius) const {
-  if (!(radius > 0.0) || !std::isfinite(x) || !std::isfinite(z)) return HeightAt(x, z);
-  const Rectangle around{{x - radius, z - radius}, {x + radius, z + radius}};
-  const double radius_squared = radius * radius;
-
-  std::array<const TerrainBox*, kMaxLocalBoxes> boxes{};
-  std::size_t count = 0;
-  VisitBoxes(around, [&](const TerrainBox& box) {
-    if (count < boxes.size() && DistanceSquared(box.min_m, box.max_m, x, z) < radius_squared) {
-      boxes[count++] = &box;
-    }
-  });
-
-  struct Lines {
-    std::array<double, 2 * kMaxLocalBoxes + 4> at{};
-    std::size_t size = 0;
-    double min;
-    double max;
-
-    Lines(double from, double to) : min(from), max(to) {
-      at[size++] = from;
-      at[size++] = to;
-    }
-    void Add(double line) {
-      if (line > min && line < max) at[size++] = line;
-    }
-  };
-  Lines across(around.min.x, around.max.x);
-  Lines along(around.min.z, around.max.z);
-  for (std::size_t b = 0; b < count; ++b) {
-    across.Add(boxes[b]->min_m.x);
-    across.Add(boxes[b]->max_m.x);
-    along.Add(boxes[b]->min_m.z);
-    along.Add(boxes[b]->max_m.z);
-  }
-  if (data_.height_field) {
-    across.Add(data_.height_field->origin_m.x);
-    across.Add(field_max_m_.x);
-    along.Add(data_.height_field->origin_m.z);
-    along.Add(field_max_m_.z);
-  }
-  std::sort(across.at.begin(), across.at.begin() + static_cast<std::ptrdiff_t>(across.size));
-  std::sort(along.at.begin(), along.at.begin() + static_cast<std::ptrdiff_t>(along.size));
-
-  double lowest = kMaxTerrainHeightM;
-  for (std::size_t j = 0; j + 1 < along.size; ++j) {
-    for (std::size_t i = 0; i + 1 < across.size; ++i) {
-      const Rectangle part{{across.at[i], along.at[j]}, {across.at[i + 1], along.at[j + 1]}};
-      if (!(part.max.x > part.min.x && part.max.z > part.min.z)) continue;
-      if (!(DistanceSquared(part.min, part.max, x, z) < radius_squared)) continue;
-      double top = -kMaxTerrainHeightM;
-      for (std::size_t b = 0; b < count; ++b) {
-        const TerrainBox& box = *boxes[b];
-        if (box.min_m.x <= part.min.x && box.max_m.x >= part.max.x && box.min_m.z <= part.min.z &&
-            box.max_m.z >= part.max.z) {
-          top = std::max(top, box.height_m);
-        }
-      }
-      if (top >= lowest) continue;
-      const bool in_field = InField(part.min.x, part.min.z) && InField(part.max.x, part.max.z);
-      const double ground = in_field ? FieldExtremes(part).lowest : 0.0;
-      lowest = std::min(lowest, std::max(ground, top));
-    }
-  }
-  return lowest;
 }
 
 }  // namespace stridewire

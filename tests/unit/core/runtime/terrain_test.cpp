@@ -97,7 +97,6 @@ TEST(Terrain, EmptyTerrainIsFlat) {
   EXPECT_EQ(terrain->HeightAt(3.0, -4.0), 0.0);
   EXPECT_EQ(terrain->NormalAt(3.0, -4.0), Vec3(0, 1, 0));
   EXPECT_EQ(terrain->HighestWithin(0.0, 0.0, 1.0), 0.0);
-  EXPECT_EQ(terrain->LowestWithin(0.0, 0.0, 1.0), 0.0);
   const FootSupport support = SupportOf(*terrain, 1.0, 2.0, 0.7, {0.2, 0.1, 0.05});
   EXPECT_EQ(support.normal, Vec3(0, 1, 0));
   EXPECT_EQ(support.plane_height_m, 0.0);
@@ -128,18 +127,9 @@ TEST(Terrain, BordersBelongToBoxAndField) {
   EXPECT_EQ(terrain->HighestWithin(1.75, 3.0, std::nextafter(0.25, 0.0)), 0.0);
   EXPECT_EQ(terrain->HighestWithin(2.75, 3.0, 0.25), 0.5);
   EXPECT_EQ(terrain->HighestWithin(2.75, 3.0, std::nextafter(0.25, 0.0)), 0.25);
-  EXPECT_EQ(terrain->LowestWithin(3.75, 3.0, 0.25), 0.5);
-  EXPECT_EQ(terrain->LowestWithin(3.75, 3.0, 0.2500001), 0.0);
   // Corners count by their distance from the centre, not by the square around the disc.
   EXPECT_EQ(terrain->HighestWithin(1.8, 1.8, 0.25), 0.0);
   EXPECT_EQ(terrain->HighestWithin(1.8, 1.8, 0.29), 0.25);
-}
-
-TEST(Terrain, AdjacentBoxesHaveNoGap) {
-  const auto terrain =
-      MakeTerrain({{}, {{{0, 0}, {1, 1}, 0.3}, {{1, 0}, {2, 1}, 0.3}, {{0, 1}, {2, 2}, 0.3}}});
-  EXPECT_EQ(terrain->LowestWithin(1.0, 1.0, 0.5), 0.3);
-  EXPECT_EQ(terrain->LowestWithin(1.0, 0.3, 0.5), 0.0);
 }
 
 TEST(Terrain, MatchesBruteForce) {
@@ -160,7 +150,7 @@ TEST(Terrain, MatchesBruteForce) {
   }
 }
 
-TEST(Terrain, DiscQueriesBoundAllHeightsInside) {
+TEST(Terrain, HighestWithinBoundsAllHeightsInside) {
   const unsigned seed = 77;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -173,36 +163,22 @@ TEST(Terrain, DiscQueriesBoundAllHeightsInside) {
       const double z = RandomEighth(random);
       const double radius = query % 2 == 0 ? 0.125 * (1 + query % 5) : 0.7 * unit(random);
       const double highest = terrain->HighestWithin(x, z, radius);
-      const double lowest = terrain->LowestWithin(x, z, radius);
       for (int sample = 0; sample < 100; ++sample) {
         const double angle = 2 * std::numbers::pi * unit(random);
         const double distance = radius * 0.999999 * unit(random);
         const double height =
             terrain->HeightAt(x + distance * std::cos(angle), z + distance * std::sin(angle));
         ASSERT_GE(highest, height - 1e-12) << x << ", " << z << ", " << radius;
-        ASSERT_LE(lowest, height + 1e-12) << x << ", " << z << ", " << radius;
       }
       if (data.height_field) continue;
-      // With boxes only, the ground is level within each quarter-metre cell, so the result is
-      // exact.
+      // With boxes only, the result is exact.
       double expected_highest = 0.0;
       for (const TerrainBox& box : data.boxes) {
         if (DistanceTo(box.min_m, box.max_m, x, z) <= radius) {
           expected_highest = std::max(expected_highest, box.height_m);
         }
       }
-      double expected_lowest = kInfinity;
-      for (int j = -40; j < 40; ++j) {
-        for (int i = -40; i < 40; ++i) {
-          const GroundPoint min{0.25 * i, 0.25 * j};
-          if (DistanceTo(min, {min.x + 0.25, min.z + 0.25}, x, z) < radius) {
-            expected_lowest =
-                std::min(expected_lowest, BruteHeight(data, min.x + 0.125, min.z + 0.125));
-          }
-        }
-      }
       ASSERT_EQ(highest, expected_highest) << x << ", " << z << ", " << radius;
-      ASSERT_EQ(lowest, expected_lowest) << x << ", " << z << ", " << radius;
     }
   }
 }
@@ -302,10 +278,8 @@ TEST(Terrain, TreatsNonFiniteCoordinatesAsOutside) {
     EXPECT_EQ(terrain->HeightAt(bad, 0.0), 0.0);
     EXPECT_EQ(terrain->NormalAt(0.0, bad), Vec3(0, 1, 0));
     EXPECT_EQ(terrain->HighestWithin(bad, 0.0, 1.0), 0.0);
-    EXPECT_EQ(terrain->LowestWithin(0.0, bad, 1.0), 0.0);
   }
   EXPECT_EQ(terrain->HighestWithin(0.0, 0.0, kInfinity), 2.0);
-  EXPECT_EQ(terrain->LowestWithin(0.0, 0.0, kInfinity), 0.0);
 }
 
 void ExpectRefused(TerrainData data, ErrorCode code, const std::string& where) {
