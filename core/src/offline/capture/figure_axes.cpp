@@ -26,11 +26,12 @@ constexpr double kMotionCos = 0.85;
 constexpr double kWeakMotionCos = 0.35;
 // The following distances are in leg lengths.
 constexpr double kAtZero = 0.12;  // Largest distance from zero of a floor that counts as at zero.
-// A figure travels horizontally if it moves at least kTravels along that axis, and at least
+// A figure travels horizontally if it moves at least kMinTravel along that axis, and at least
 // kTravelRatio times as far as along the up axis.
-constexpr double kTravels = 0.6;
+constexpr double kMinTravel = 0.6;
 constexpr double kTravelRatio = 2.0;
-constexpr double kStays = 0.3;  // A figure on a level floor moves less than this along the up axis.
+constexpr double kMaxRise =
+    0.3;  // A figure on a level floor moves less than this along the up axis.
 // Smallest difference of cosines by which the motion prefers one up axis to another.
 constexpr double kClearGain = 0.5;
 constexpr double kClearFeet = 0.5;  // Shortest sum of both unit foot vectors that point somewhere.
@@ -168,7 +169,7 @@ class AxesFinder {
   }
 
   bool HasFloorAtZero(const Extent& extent) const {
-    return IsAtZero(extent) && extent.travel < kStays * leg_length_;
+    return IsAtZero(extent) && extent.travel < kMaxRise * leg_length_;
   }
 
   // Returns true if the figure stands and moves along `up` as in a file whose up axis that is,
@@ -176,7 +177,7 @@ class AxesFinder {
   bool StandsAlong(const DVec3& up, const DVec3& other) const {
     const Extent along_up = ExtentAlong(up);
     const Extent along_other = ExtentAlong(other);
-    const bool travels = along_other.travel > kTravels * leg_length_ &&
+    const bool travels = along_other.travel > kMinTravel * leg_length_ &&
                          along_other.travel > kTravelRatio * along_up.travel;
     return travels || (HasFloorAtZero(along_up) && !HasFloorAtZero(along_other));
   }

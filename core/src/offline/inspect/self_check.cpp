@@ -20,9 +20,9 @@ constexpr double kFps = 30.0;
 constexpr int kSteps = 3;
 constexpr double kStandS = 0.5;
 constexpr double kGoalM = 3.0;
+// Largest deviations with which the checks pass.
 constexpr double kMaxStopM = 0.03;
-// A walk that arrives ends much closer to its goal (kArrivedM); this bounds the figure reported.
-constexpr double kMaxGoalM = 0.05;
+constexpr double kMaxGoalM = 0.05;  // Walks that arrive are much closer to their goal (kArrivedM).
 constexpr double kMaxKneeDeg = 60.0;
 constexpr double kMaxSoleM = 0.01;
 
@@ -51,7 +51,7 @@ class Checker {
     return result_.checks.back();
   }
 
-  static void Judge(CheckResult& check, double measured, std::string text) {
+  static void CompareWithBound(CheckResult& check, double measured, std::string text) {
     check.measured = measured;
     check.verdict = measured <= check.bound ? CheckVerdict::kPassed : CheckVerdict::kFailed;
     check.text = std::move(text);
@@ -69,15 +69,15 @@ class Checker {
            (summary_.stops[0].is_available() || summary_.stops[1].is_available());
   }
 
-  // Returns true, and says so in `check`, if the library has no step.
-  [[nodiscard]] bool SaysThereAreNoSteps(CheckResult& check) const {
+  // If the library has no steps, marks the check as not applicable and returns true.
+  [[nodiscard]] bool SkipWithoutSteps(CheckResult& check) const {
     if (has_steps()) return false;
     check.verdict = CheckVerdict::kNotApplicable;
     check.text = "The library has no steps.";
     return true;
   }
 
-  // Returns what to do if walking fails: the first thing that is missing for it.
+  // Returns what the user can do if walking fails, considering the first missing prerequisite.
   [[nodiscard]] std::string WalkAdvice() const {
     const bool has_left = summary_.has_steps_of(Foot::kLeft);
     if (!has_left || !summary_.has_steps_of(Foot::kRight)) {
@@ -122,7 +122,7 @@ class Checker {
 
   void CheckThreeSteps() {
     CheckResult& check = Add("three_steps", "Three plain steps", kMaxMissM, "m");
-    if (SaysThereAreNoSteps(check)) return;
+    if (SkipWithoutSteps(check)) return;
     if (!steps_) {
       Fail(check, Text("Three steps of %.2f m are not possible: ", steps_m_) + steps_error_ + ".",
            WalkAdvice());
@@ -134,12 +134,13 @@ class Checker {
       if (worst == nullptr || refusal.missed_m > worst->missed_m) worst = &refusal;
     }
     const double worst_m = LargestStepMiss();
-    Judge(
+    CompareWithBound(
         check, worst_m,
         Text("Three steps of %.2f m land within %.3f m of where they should.", steps_m_, worst_m));
-    if (const char* const wrong = WrongOrder(); wrong != nullptr) {
-      check.measured.reset();  // The steps that were made are not those that were requested.
-      Fail(check, Text("Three steps of %.2f m are not possible: ", steps_m_) + wrong, WalkAdvice());
+    if (const char* const problem = OrderProblem(); problem != nullptr) {
+      check.measured.reset();  // Steps in another order than requested have no meaningful error.
+      Fail(check, Text("Three steps of %.2f m are not possible: ", steps_m_) + problem,
+           WalkAdvice());
     } else if (worst != nullptr) {
       Fail(
           check,
@@ -163,9 +164,9 @@ class Checker {
     return largest_m;
   }
 
-  // Returns what is wrong with the order of the steps, up to the last one requested: left and right
-  // must take turns, and none may be inserted between them. Returns null if nothing is wrong.
-  [[nodiscard]] const char* WrongOrder() const {
+  // Checks that left and right steps alternate up to the last requested step, without additional
+  // steps in between. Returns the problem, or null if there is none.
+  [[nodiscard]] const char* OrderProblem() const {
     const MovementRecord* previous = nullptr;
     for (const MovementRecord& record : steps_->movements) {
       if (!IsStep(record.kind)) continue;
@@ -183,20 +184,21 @@ class Checker {
 
   void CheckStop() {
     CheckResult& check = Add("stop", "Stop with the feet together", kMaxStopM, "m");
-    if (SaysThereAreNoSteps(check)) return;
+    if (SkipWithoutSteps(check)) return;
     if (!steps_) {
       Fail(check, "No walk to stop from is possible: " + steps_error_ + ".", WalkAdvice());
     } else {
       const Clip& clip = steps_->clip;
-      const DVec3 stands = FootVector(library_->skeleton(), clip.frame(clip.frame_count() - 1),
-                                      Foot::kLeft, steps_->movements.back().base.heading_rad);
+      const DVec3 stopped = FootVector(library_->skeleton(), clip.frame(clip.frame_count() - 1),
+                                       Foot::kLeft, steps_->movements.back().base.heading_rad);
       const DVec3 stand =
           FootVector(library_->skeleton(), library_->stand_pose(), Foot::kLeft, 0.0);
-      const double apart_m = std::fabs(stands.z - stand.z);
-      Judge(check, apart_m,
-            Text("After the steps, the feet stand %.3f m from their positions in the stand pose, "
-                 "measured forward.",
-                 apart_m));
+      const double apart_m = std::fabs(stopped.z - stand.z);
+      CompareWithBound(
+          check, apart_m,
+          Text("After the steps, the feet stand %.3f m from their positions in the stand pose, "
+               "measured forward.",
+               apart_m));
       check.advice = check.verdict == CheckVerdict::kFailed ? kRecordStops : "";
     }
     if (!has_stop() && check.verdict != CheckVerdict::kPassed) {
@@ -208,7 +210,7 @@ class Checker {
 
   void CheckWalk() {
     CheckResult& check = Add("walk_to", "Walk to a goal 3 m ahead", kMaxGoalM, "m");
-    if (SaysThereAreNoSteps(check)) return;
+    if (SkipWithoutSteps(check)) return;
     const MovementRequest walk{.id = 1,
                                .movement = WalkRequest{.position_m = DVec3(0.0, 0.0, kGoalM)}};
     const auto played = Synthesize(
@@ -225,8 +227,9 @@ class Checker {
         played->movements, [](const MovementRecord& m) { return IsStep(m.kind); }));
     const char* const steps = step_count == 1 ? "step" : "steps";
     if (record.arrived) {
-      Judge(check, left_m,
-            Text("The walk arrives after %d %s, %.3f m from its goal.", step_count, steps, left_m));
+      CompareWithBound(
+          check, left_m,
+          Text("The walk arrives after %d %s, %.3f m from its goal.", step_count, steps, left_m));
       return;
     }
     if (!has_stop()) check.bound = 0.5 * steps_m_;
@@ -245,13 +248,14 @@ class Checker {
   void CheckLegs() {
     PlayJump();
     CheckResult& knees = Add("knees", "Knees bend forward", kMaxKneeDeg, "degrees");
-    if (!SaysThereIsNothingToMeasure(knees)) {
+    if (!SkipWithoutFeet(knees)) {
       if (!legs_.knee_deg) {
         knees.text = "No leg bends by more than 20 degrees.";
       } else {
-        Judge(knees, *legs_.knee_deg,
-              Text("Bent knees point at most %.0f degrees away from the direction of their feet.",
-                   *legs_.knee_deg));
+        CompareWithBound(
+            knees, *legs_.knee_deg,
+            Text("Bent knees point at most %.0f degrees away from the direction of their feet.",
+                 *legs_.knee_deg));
         if (knees.verdict == CheckVerdict::kFailed) {
           knees.advice =
               "Check that hip, knee and ankle are the right joints of the capture; --left-ankle "
@@ -260,11 +264,12 @@ class Checker {
       }
     }
     CheckResult& soles = Add("soles", "Soles on the ground", kMaxSoleM, "m");
-    if (!SaysThereIsNothingToMeasure(soles)) {
-      Judge(soles, std::max(legs_.hover_m, legs_.sink_m),
-            Text("Standing soles are at most %.3f m above the ground, and the balls of the feet at "
-                 "most %.3f m below it.",
-                 legs_.hover_m, legs_.sink_m));
+    if (!SkipWithoutFeet(soles)) {
+      CompareWithBound(
+          soles, std::max(legs_.hover_m, legs_.sink_m),
+          Text("Standing soles are at most %.3f m above the ground, and the balls of the feet at "
+               "most %.3f m below it.",
+               legs_.hover_m, legs_.sink_m));
       if (soles.verdict == CheckVerdict::kFailed) {
         soles.advice =
             "Check in the report which steps leave the ground, and leave out captures whose floor "
@@ -273,7 +278,8 @@ class Checker {
     }
   }
 
-  [[nodiscard]] bool SaysThereIsNothingToMeasure(CheckResult& check) const {
+  // If no movement with feet on the ground was played, explains it in the check and returns true.
+  [[nodiscard]] bool SkipWithoutFeet(CheckResult& check) const {
     if (legs_.feet > 0) return false;
     check.text = library_->leg_rig().is_usable
                      ? "No movement could be played."
