@@ -40,8 +40,10 @@ class MomentReader {
 
   Moment Start(const MotionGroup& group, int example) {
     const auto keytimes_s = KeytimesOf(group, example);
-    return MomentOf(group, example, 0, 1, (keytimes_s[1] - keytimes_s[0]) / group.cells.front(),
-                    0.0, 0.0);
+    return MomentOf(group, example,
+                    {.point = 0,
+                     .neighbour = 1,
+                     .to_neighbour_s = (keytimes_s[1] - keytimes_s[0]) / group.cells.front()});
   }
 
   Moment End(const MotionGroup& group, int example) {
@@ -49,11 +51,15 @@ class MomentReader {
     const auto last = static_cast<std::size_t>(group.interval_count());
     const int rise =
         group.FindParameter(IsStep(group.kind) ? ParameterName::kEndY : ParameterName::kHeight);
+    const auto e = static_cast<std::size_t>(example);
+    const std::span<const double> site = group.site(example);
     return MomentOf(
-        group, example, group.grid_point_count - 1, group.grid_point_count - 2,
-        -(keytimes_s[last] - keytimes_s[last - 1]) / group.cells.back(),
-        group.heading_change_rad[static_cast<std::size_t>(example)],
-        rise < 0 ? 0.0 : GroundRise(group.site(example)[static_cast<std::size_t>(rise)]));
+        group, example,
+        {.point = group.grid_point_count - 1,
+         .neighbour = group.grid_point_count - 2,
+         .to_neighbour_s = -(keytimes_s[last] - keytimes_s[last - 1]) / group.cells.back(),
+         .heading_rad = group.heading_change_rad[e],
+         .ground_m = rise < 0 ? 0.0 : GroundRise(site[static_cast<std::size_t>(rise)])});
   }
 
  private:
@@ -62,17 +68,26 @@ class MomentReader {
     return group.keytimes_s.subspan(static_cast<std::size_t>(example) * keys, keys);
   }
 
-  // Computes the velocity from the difference to the grid point `beside`, whose time is `away_s`
-  // later.
-  Moment MomentOf(const MotionGroup& group, int example, int point, int beside, double away_s,
-                  double heading_rad, double ground_m) {
-    STRIDEWIRE_CHECK(point >= 0 && point < group.grid_point_count && away_s != 0.0);
-    const std::vector<DVec3> at = PointsOf(group, example, point);
+  // The first or last grid point of an example, and the next one, from which velocities follow.
+  struct GridEnd {
+    int point = 0;
+    int neighbour = 0;
+    double to_neighbour_s = 0.0;  // Negative if the neighbour is earlier.
+    double heading_rad = 0.0;
+    double ground_m = 0.0;
+  };
+
+  Moment MomentOf(const MotionGroup& group, int example, const GridEnd& end) {
+    STRIDEWIRE_CHECK(end.point >= 0 && end.point < group.grid_point_count);
+    STRIDEWIRE_CHECK(end.to_neighbour_s != 0.0);
+    const std::vector<DVec3> at = PointsOf(group, example, end.point);
+    const std::vector<DVec3> next = PointsOf(group, example, end.neighbour);
     const DVec3 root_m = at[0];
-    Moment moment{example, RelativeTo(at, root_m, heading_rad, ground_m),
-                  RelativeTo(PointsOf(group, example, beside), root_m, heading_rad, ground_m)};
+    Moment moment{example, RelativeTo(at, root_m, end.heading_rad, end.ground_m),
+                  RelativeTo(next, root_m, end.heading_rad, end.ground_m)};
     for (std::size_t j = 0; j < at.size(); ++j) {
-      moment.velocities_m_s[j] = (moment.velocities_m_s[j] - moment.joints_m[j]) / away_s;
+      moment.velocities_m_s[j] =
+          (moment.velocities_m_s[j] - moment.joints_m[j]) / end.to_neighbour_s;
     }
     return moment;
   }
