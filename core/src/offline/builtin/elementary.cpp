@@ -16,10 +16,4 @@ double Tanh(double x) {
   return (e - 1.0) / (e + 1.0);
 }
 
-double Ease(double x) {
-  if (x <= 0.0) return 0.0;
-  if (x >= 1.0) return 1.0;
-  return x * x * (3.0 - 2.0 * x);
-}
-
 }  // namespace stridewire::builtin

@@ -7,7 +7,4 @@ namespace stridewire::builtin {
 [[nodiscard]] double Exp(double x);
 [[nodiscard]] double Tanh(double x);
 
-/// Returns 0 for x <= 0, 1 for x >= 1, and 3x^2 - 2x^3 between them.
-[[nodiscard]] double Ease(double x);
-
 }  // namespace stridewire::builtin

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/base/math.h"
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
@@ -63,9 +64,6 @@ struct FigurePose {
 
   FigurePose() { rotations.fill(DQuat(1.0, 0.0, 0.0, 0.0)); }
 };
-
-/// Returns +1 for the left side (+X) and -1 for the right side (-X).
-[[nodiscard]] constexpr double SideSign(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
 
 /// Rotations about the axes, in radians. RotateX with a positive angle lowers the toes.
 [[nodiscard]] DQuat RotateX(double angle_rad);

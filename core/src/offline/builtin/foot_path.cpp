@@ -2,37 +2,38 @@
 
 #include <algorithm>
 
+#include "base/easing.h"
 #include "base/trig.h"
 #include "offline/builtin/elementary.h"
+#include "offline/builtin/swing_detour.h"
 
 namespace stridewire::builtin {
 namespace {
 
-// Clearance of 15 mm, plus the part of it that blending loses.
+// Least height of a swinging foot above level ground: 15 mm, plus the part that blending loses.
 constexpr double kClearanceM = 0.017;
 constexpr double kLiftStepM = 0.004;
 constexpr double kMinLiftM = -0.08;
 constexpr double kMaxLiftM = 0.30;
 
-// On a lower step the toes land first.
+// If the foot steps down by more than this, its toes land first, with this pitch.
 constexpr double kToesFirstDropM = 0.1;
 constexpr double kToesFirstRad = -18.0 * kDegree;
-// A tread begins behind the ball of a foot that lands on it from below, and ends ahead of the ball
-// of a foot that leaves it downwards.
+// Assumed edges of stair treads. If a foot steps up, the edge of the upper tread is this far behind
+// the ball of the foot after landing. If it steps down, the edge of the upper tread is this far
+// ahead of the ball before toe-off.
 constexpr double kEdgeBehindBallM = 0.15;
 constexpr double kEdgeAheadOfBallM = 0.03;
 constexpr double kEdgeClearanceM = 0.02;
 
-constexpr double kFootWidthM = 0.085;  // Minimum distance of feet that pass each other.
-constexpr double kBowStepM = 0.005;
-constexpr double kMaxBowM = 0.40;
+constexpr DetourRange kDetours = {.max_m = 0.40, .step_m = 0.005, .clearance_m = 0.085};
 
 DVec3 Forward(Foot foot, double yaw_rad = 0.0) {
   const double yaw = yaw_rad + SideSign(foot) * kToeOutRad;
   return {Sin(yaw), 0.0, Cos(yaw)};
 }
 
-// A step from standing has half the push-off, since the body does not move yet.
+// In a step from standing, the foot pushes off half as much, because the body does not move yet.
 double ToeOffPitch(const StepTiming& timing) {
   if (!timing.start.standing()) return timing.start.toe_off_pitch_rad;
   return 0.5 * 68.0 * kDegree * Tanh(0.5 * timing.end.length_m / 0.5);
@@ -112,16 +113,21 @@ Curve MakeToeBend(const StepTiming& timing) {
                 {timing.heel_strike_s, -0.97 * strike, 0.0}});
 }
 
-// Returns the position of a swinging foot along one axis, at the fraction `u` of its swing. It is
-// fastest at 70 % of the swing and slows down just before it lands, as in captures of walking.
-// Positions are in metres, velocities in metres per second.
-double SwingAlong(double u, double swing_s, double from, double from_velocity, double to,
-                  double to_velocity) {
-  const double way = to - from;
-  return Curve({{0.0, from, from_velocity * swing_s},
-                {0.35, from + 0.30 * way, 1.02 * way},
-                {0.72, from + 0.755 * way, 1.32 * way},
-                {1.0, to, to_velocity * swing_s}})
+// Position of a swinging foot along one axis at one end of its swing.
+struct SwingEnd {
+  double position_m;
+  double velocity;  // Metres per swing.
+};
+
+// Returns the position of a swinging foot along one axis, at the fraction `u` of its swing. The
+// foot is fastest at 70 % of the swing and slows down just before it lands, as in captures of
+// walking.
+double SwingAlong(double u, const SwingEnd& from, const SwingEnd& to) {
+  const double path_m = to.position_m - from.position_m;
+  return Curve({{0.0, from.position_m, from.velocity},
+                {0.35, from.position_m + 0.30 * path_m, 1.02 * path_m},
+                {0.72, from.position_m + 0.755 * path_m, 1.32 * path_m},
+                {1.0, to.position_m, to.velocity}})
       .At(u);
 }
 
@@ -179,7 +185,7 @@ FootPaths::FootPaths(Foot moving, const StepTiming& timing)
   };
   strike_m_ = striking(timing.heel_strike_s);
   strike_velocity_ = (striking(timing.heel_strike_s + h) - strike_m_) / h;
-  if (shape.turn_rad != 0.0) BowSwingAroundFixedFoot();
+  if (shape.turn_rad != 0.0) LeadSwingAroundFixedFoot();
   RaiseSwingUntilClear();
 }
 
@@ -195,15 +201,15 @@ FootPose FootPaths::MovingInSwing(double time_s) const {
   const double swing = timing_.swing_s();
   const double u = (time_s - timing_.toe_off_s) / swing;
   const double y0 = start_ball_m_.y, y1 = end_ball_m_.y, climb = y1 - y0;
-  // Downwards, the foot first moves out over the edge; upwards, it rises first.
+  // Downwards, the foot first moves forward past the edge of the tread. Upwards, it rises first.
   const double w = climb < 0.0   ? u + 0.6 * u * u * (1.0 - u)
                    : climb > 0.0 ? u - 0.6 * u * (1.0 - u) * (1.0 - u)
                                  : u;
-  const double climbed = climb < 0.0 ? Ease((u - 0.45) / 0.55) : Ease(u / 0.6);
+  const double climbed = climb < 0.0 ? SmoothStep((u - 0.45) / 0.55) : SmoothStep(u / 0.6);
   const double u2 = w * w, u3 = u2 * w;
   FootPose foot_pose;
   foot_pose.pitch_rad = moving_pitch_.At(time_s);
-  foot_pose.yaw_rad = timing_.shape.turn_rad * Ease((u - 0.1) / 0.8);
+  foot_pose.yaw_rad = timing_.shape.turn_rad * SmoothStep((u - 0.1) / 0.8);
   foot_pose.toe_pitch_rad = foot_pose.pitch_rad + toe_bend_.At(time_s);
   const DVec3 from = toe_off_m_ - DVec3(0.0, y0, 0.0), to = strike_m_ - DVec3(0.0, y1, 0.0);
   foot_pose.ankle_m = (2.0 * u3 - 3.0 * u2 + 1.0) * from +
@@ -211,9 +217,9 @@ FootPose FootPaths::MovingInSwing(double time_s) const {
                       (u3 - u2) * swing * strike_velocity_;
   if (timing_.shape.style != StepStyle::kStairs) {
     foot_pose.ankle_m.x =
-        SwingAlong(u, swing, from.x, toe_off_velocity_.x, to.x, strike_velocity_.x);
+        SwingAlong(u, {from.x, toe_off_velocity_.x * swing}, {to.x, strike_velocity_.x * swing});
     foot_pose.ankle_m.z =
-        SwingAlong(u, swing, from.z, toe_off_velocity_.z, to.z, strike_velocity_.z);
+        SwingAlong(u, {from.z, toe_off_velocity_.z * swing}, {to.z, strike_velocity_.z * swing});
     // The ankle is highest early in the swing and then falls to slightly above its height at
     // heel-strike.
     foot_pose.ankle_m.y = Curve({{0.0, from.y, toe_off_velocity_.y * swing},
@@ -221,9 +227,8 @@ FootPose FootPaths::MovingInSwing(double time_s) const {
                                  {1.0, to.y, strike_velocity_.y * swing}})
                               .At(u);
   }
-  const double middle = 16.0 * u * u * (1.0 - u) * (1.0 - u);
-  foot_pose.ankle_m.y += y0 + climb * climbed + lift_m_ * middle;
-  foot_pose.ankle_m += bow_m_ * middle * SideSign(moving_) *
+  foot_pose.ankle_m.y += y0 + climb * climbed + lift_m_ * Bump(u);
+  foot_pose.ankle_m += detour_m_ * Bump(u) * SideSign(moving_) *
                        (RotateY(0.5 * timing_.shape.turn_rad) * DVec3(1, 0, 0));
   return foot_pose;
 }
@@ -258,7 +263,7 @@ double FootPaths::NearestApproach() const {
   };
   DVec3 still[5], swinging[5];
   points(fixed, FootOnGround(fixed, fixed_ball_m_, 0.0, 0.0), still);
-  double nearest = kMaxBowM;
+  double nearest = kDetours.max_m;
   for (int i = 1; i < 20; ++i) {
     points(moving_, MovingInSwing(timing_.toe_off_s + 0.05 * i * timing_.swing_s()), swinging);
     for (const DVec3& a : still) {
@@ -268,18 +273,11 @@ double FootPaths::NearestApproach() const {
   return nearest;
 }
 
-void FootPaths::BowSwingAroundFixedFoot() {
-  double best_m = 0.0, widest_m = 0.0;
-  for (bow_m_ = 0.0; bow_m_ < kMaxBowM; bow_m_ += kBowStepM) {
-    const double nearest_m = NearestApproach();
-    // This detour does not increase the smallest distance, for example because the feet are closest
-    // at landing.
-    if (nearest_m <= widest_m + 1e-3) continue;
-    widest_m = nearest_m;
-    best_m = bow_m_;
-    if (widest_m >= kFootWidthM) break;
-  }
-  bow_m_ = best_m;
+void FootPaths::LeadSwingAroundFixedFoot() {
+  detour_m_ = FindDetour(kDetours, [&](double detour_m) {
+    detour_m_ = detour_m;
+    return NearestApproach();
+  });
 }
 
 void FootPaths::RaiseSwingUntilClear() {

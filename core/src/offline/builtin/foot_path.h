@@ -49,7 +49,7 @@ class FootPaths {
   [[nodiscard]] FootPose MovingInSwing(double time_s) const;
   [[nodiscard]] double GroundAt(double z_m) const;
   [[nodiscard]] double NearestApproach() const;
-  void BowSwingAroundFixedFoot();
+  void LeadSwingAroundFixedFoot();
   void RaiseSwingUntilClear();
 
   Foot moving_;
@@ -58,7 +58,7 @@ class FootPaths {
   Curve fixed_pitch_, moving_pitch_, toe_rock_, toe_bend_;
   DVec3 toe_off_m_, strike_m_, toe_off_velocity_, strike_velocity_;
   double lift_m_ = 0.0;
-  double bow_m_ = 0.0;  // Sideways detour of the swing around the fixed foot.
+  double detour_m_ = 0.0;  // Sideways detour of the swing around the fixed foot.
 };
 
 }  // namespace stridewire::builtin

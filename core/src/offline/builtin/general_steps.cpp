@@ -14,43 +14,44 @@ namespace {
 
 using Names = std::vector<ParameterName>;
 
-std::string Centimetres(double length_m) {
+// Returns a length below 1 m in metres with two decimals.
+std::string MetresText(double length_m) {
   const int centimetres = static_cast<int>(std::floor(std::fabs(length_m) * 100.0 + 0.5));
   const std::string digits = std::to_string(centimetres);
   return std::string(length_m < 0.0 ? "-0." : "0.") + (centimetres < 10 ? "0" : "") + digits;
 }
 
-std::string Degrees(double angle_rad) {
+std::string DegreesText(double angle_rad) {
   return std::to_string(static_cast<int>(std::floor(angle_rad / kDegree + 0.5)));
 }
 
 // Describes a step, for example "generated step 0.35 to 0.55 m". If it is not straight, the text
 // also contains its other parameters.
 std::string Describe(const StepShape& shape) {
-  std::string text = "generated step " + Centimetres(std::fabs(shape.start_m.z)) + " to " +
-                     Centimetres(shape.end_m.z) + " m";
-  if (shape.start_m.x != NaturalSide() || shape.end_m.x != NaturalSide()) {
-    text += ", side " + Centimetres(shape.start_m.x) + " to " + Centimetres(shape.end_m.x) + " m";
+  std::string text = "generated step " + MetresText(std::fabs(shape.start_m.z)) + " to " +
+                     MetresText(shape.end_m.z) + " m";
+  if (shape.start_m.x != StandWidthM() || shape.end_m.x != StandWidthM()) {
+    text += ", side " + MetresText(shape.start_m.x) + " to " + MetresText(shape.end_m.x) + " m";
   }
   if (shape.start_m.y != 0.0 || shape.end_m.y != 0.0) {
-    text += ", height " + Centimetres(shape.start_m.y) + " to " + Centimetres(shape.end_m.y) + " m";
+    text += ", height " + MetresText(shape.start_m.y) + " to " + MetresText(shape.end_m.y) + " m";
   }
-  if (shape.turn_rad != 0.0) text += ", turn " + Degrees(shape.turn_rad) + " degrees";
+  if (shape.turn_rad != 0.0) text += ", turn " + DegreesText(shape.turn_rad) + " degrees";
   return text;
 }
 
 constexpr double kWalkTurnRad = 40.0 * kDegree;
 constexpr double kSpotTurnRad = 60.0 * kDegree;
 
-// Returns the sideways position of the ball of a foot that has turned outwards on the spot.
-double OpenSide(double turn_rad) {
-  return NaturalSide() + (0.26 - NaturalSide()) * std::min(1.0, turn_rad / kSpotTurnRad + 0.2);
+// Returns the sideways distance of the feet after one of them has turned outward on the spot.
+double WidthAfterTurnM(double turn_rad) {
+  return StandWidthM() + (0.26 - StandWidthM()) * std::min(1.0, turn_rad / kSpotTurnRad + 0.2);
 }
 
 // A group of left steps and the group of their mirror images.
-class Groups {
+class MirroredGroups {
  public:
-  explicit Groups(Names names)
+  explicit MirroredGroups(Names names)
       : left_{MovementKind::kStepLeft, names, {}}, right_{MovementKind::kStepRight, names, {}} {}
 
   void Add(const Skeleton& figure, const StepShape& shape) {
@@ -71,9 +72,9 @@ class Groups {
   RawGroup left_, right_;
 };
 
-// Adds steps upwards (`direction` 1) or downwards (-1). They are separate groups, since knees bend
-// more with the distance from level in both directions, which a single linear part cannot
-// represent.
+// Adds steps upwards (`direction` 1) or downwards (-1). These are separate groups, because knees
+// bend more the farther a step is from level, upwards as well as downwards. The linear part of one
+// interpolation cannot represent such a minimum at level steps.
 void AddClimbingSteps(double direction, RawLibrary& library) {
   constexpr double kRiseM = 0.25;
   constexpr double kTurnRad = 35.0 * kDegree;
@@ -83,8 +84,8 @@ void AddClimbingSteps(double direction, RawLibrary& library) {
   };
   constexpr std::array kClimbs = {Climb{0.0, 0.0}, Climb{0.0, 1.0}, Climb{-1.0, 1.0},
                                   Climb{-1.0, 0.0}};
-  Groups groups({ParameterName::kStartY, ParameterName::kStartZ, ParameterName::kEndY,
-                 ParameterName::kEndZ, ParameterName::kTurn});
+  MirroredGroups groups({ParameterName::kStartY, ParameterName::kStartZ, ParameterName::kEndY,
+                         ParameterName::kEndZ, ParameterName::kTurn});
   const auto add = [&](const Climb& climb, double start_z, double end_z, double turn_rad) {
     StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
     shape.start_m.y = direction * climb.start * kRiseM;
@@ -120,7 +121,7 @@ void AddClimbingSteps(double direction, RawLibrary& library) {
 
 void AddStraightSteps(RawLibrary& library) {
   constexpr std::array kLengthsM = {0.0, 0.35, 0.55, 0.75};
-  Groups groups({ParameterName::kStartZ, ParameterName::kEndZ});
+  MirroredGroups groups({ParameterName::kStartZ, ParameterName::kEndZ});
   for (const double start_m : kLengthsM) {
     for (const double end_m : kLengthsM) {
       if (start_m == 0.0 && end_m == 0.0) continue;
@@ -133,14 +134,14 @@ void AddStraightSteps(RawLibrary& library) {
 void AddBackwardSteps(RawLibrary& library) {
   constexpr std::array kLengthsM = {0.0, 0.2, 0.4};
   const Names names = {ParameterName::kStartZ, ParameterName::kEndZ};
-  Groups groups(names);
+  MirroredGroups groups(names);
   for (const double start_m : kLengthsM) {
     for (const double end_m : kLengthsM) {
       if (start_m == 0.0 && end_m == 0.0) continue;
       RawExample example = Reversed(MakeStep(
           library.skeleton, Foot::kLeft, StraightShape(Foot::kLeft, end_m, start_m), names, {}));
       example.source =
-          "generated step backward " + Centimetres(start_m) + " to " + Centimetres(end_m) + " m";
+          "generated step backward " + MetresText(start_m) + " to " + MetresText(end_m) + " m";
       groups.Add(std::move(example));
     }
   }
@@ -149,7 +150,7 @@ void AddBackwardSteps(RawLibrary& library) {
 
 void AddTurningSteps(RawLibrary& library) {
   constexpr std::array kLengthsM = {0.0, 0.4, 0.75};
-  Groups groups(
+  MirroredGroups groups(
       {ParameterName::kStartX, ParameterName::kStartZ, ParameterName::kEndZ, ParameterName::kTurn});
   const auto add = [&](double start_x, double start_z, double end_z, double turn_rad) {
     StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
@@ -158,31 +159,31 @@ void AddTurningSteps(RawLibrary& library) {
     shape.style = StepStyle::kGeneral;
     // If the foot turns outwards and lands beside the other, it must not touch the heel of that
     // foot.
-    if (end_z == 0.0 && turn_rad > 0.0) shape.end_m.x = OpenSide(turn_rad);
+    if (end_z == 0.0 && turn_rad > 0.0) shape.end_m.x = WidthAfterTurnM(turn_rad);
     groups.Add(library.skeleton, shape);
   };
   for (const double start_m : kLengthsM) {
     for (const double end_m : kLengthsM) {
       const bool on_the_spot = start_m == 0.0 && end_m == 0.0;
       for (const double side : {0.0, 1.0, -1.0}) {
-        add(NaturalSide(), start_m, end_m, side * (on_the_spot ? kSpotTurnRad : kWalkTurnRad));
+        add(StandWidthM(), start_m, end_m, side * (on_the_spot ? kSpotTurnRad : kWalkTurnRad));
       }
     }
   }
   // Adds steps that continue after an outward turn.
-  const double open_m = OpenSide(kSpotTurnRad);
-  add(open_m, 0.0, 0.0, 0.0);
-  add(open_m, 0.0, 0.0, kSpotTurnRad);
-  add(open_m, 0.0, 0.0, -kSpotTurnRad);
-  add(open_m, 0.0, 0.4, 0.0);
+  const double wide_m = WidthAfterTurnM(kSpotTurnRad);
+  add(wide_m, 0.0, 0.0, 0.0);
+  add(wide_m, 0.0, 0.0, kSpotTurnRad);
+  add(wide_m, 0.0, 0.0, -kSpotTurnRad);
+  add(wide_m, 0.0, 0.4, 0.0);
   groups.MoveTo(library);
 }
 
 void AddSideSteps(RawLibrary& library) {
-  const double near_m = NaturalSide();
+  const double near_m = StandWidthM();
   const std::array kSidesM = {near_m, near_m + 0.3};
   constexpr std::array kLengthsM = {0.0, 0.4};
-  Groups groups(
+  MirroredGroups groups(
       {ParameterName::kStartX, ParameterName::kStartZ, ParameterName::kEndX, ParameterName::kEndZ});
   for (const double start_x : kSidesM) {
     for (const double end_x : kSidesM) {

@@ -20,6 +20,12 @@ double ReachAtKnee(double knee_rad) {
   return std::sqrt(kThighM * kThighM + kShankM * kShankM + 2.0 * kThighM * kShankM * Cos(knee_rad));
 }
 
+double HighestHipM(const DVec3& hip_m, const DVec3& ankle_m, double reach_m) {
+  const double dx = hip_m.x - ankle_m.x;
+  const double dz = hip_m.z - ankle_m.z;
+  return ankle_m.y + std::sqrt(std::max(0.0, reach_m * reach_m - dx * dx - dz * dz));
+}
+
 void SolveLeg(Foot foot, const FootPose& target, FigurePose& pose, double heading_rad) {
   const std::size_t hip = foot == Foot::kLeft ? kLeftUpLeg : kRightUpLeg;
   const double side = SideSign(foot);

@@ -8,6 +8,10 @@ namespace stridewire::builtin {
 /// Returns the distance from hip to ankle in metres for a knee angle (0: straight).
 [[nodiscard]] double ReachAtKnee(double knee_rad);
 
+/// Returns the largest height at which a hip, vertically above or below `hip_m`, is at most
+/// `reach_m` from the ankle.
+[[nodiscard]] double HighestHipM(const DVec3& hip_m, const DVec3& ankle_m, double reach_m);
+
 /// Sets the rotations of hip, knee, ankle and toe joint of one leg such that the foot has the pose
 /// `target`. The knee is a hinge about its x axis and points in the direction of the foot. If the
 /// body has turned relative to the foot, it points halfway between the foot and `heading_rad`. If

@@ -43,14 +43,15 @@ RawExample Mirrored(const RawExample& example, std::span<const ParameterName> na
   return mirrored;
 }
 
-RawExample Reversed(const RawExample& example) {
+RawExample Reversed(const RawExample& example, double slowdown) {
   STRIDEWIRE_CHECK(example.parameters.size() == 2 && example.heading_change_rad == 0.0);
   RawExample reversed = example;
-  const double end_s = example.keytimes_s.back();
+  const double end_s = slowdown * example.keytimes_s.back();
   const std::size_t keys = example.keytimes_s.size();
   for (std::size_t k = 0; k < keys; ++k) {
-    reversed.keytimes_s[k] = end_s - example.keytimes_s[keys - 1 - k];
+    reversed.keytimes_s[k] = end_s - slowdown * example.keytimes_s[keys - 1 - k];
   }
+  reversed.clip.fps = example.clip.fps / slowdown;
   const int last = example.clip.frame_count() - 1;
   const Vec3 start = example.clip.frame(last).root_position_m;
   for (int f = 0; f <= last; ++f) {

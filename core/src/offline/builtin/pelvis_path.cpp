@@ -4,28 +4,30 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/easing.h"
 #include "base/trig.h"
-#include "offline/builtin/elementary.h"
+#include "offline/base/moving_window.h"
 #include "offline/builtin/leg_ik.h"
 
 namespace stridewire::builtin {
 namespace {
 
 constexpr int kSamples = 161;
-constexpr double kMinKneeRad = 6.0 * kDegree;
+constexpr double kMinKneeRad = 6.0 * kDegree;  // The knees bend by at least this angle.
 // Amplitudes at 1.4 m/s. Perry and Burnfield, Gait Analysis, state 5 degrees of yaw and 4 of
 // obliquity to each side. These are slightly larger, because blended steps lose a part.
 constexpr double kYawRad = 6.5 * kDegree;
 constexpr double kRollRad = 4.8 * kDegree;
 constexpr double kTiltRad = 1.5 * kDegree;
 
-// All steps through a state must have the same pelvis there. Therefore it depends only on the
-// balls: it is midway between the feet sideways, and ahead of the rear ankle as if that foot were
-// flat.
+// Where the pelvis is between the feet, sideways: 0 above the fixed foot, 1 above the moving foot.
 constexpr double kMiddleShare = 0.5;
 
+// Positions of the pelvis at both ends of a step, except for its height. A step can only follow
+// another one without a jump if both have the same pelvis in the state in between. Therefore the
+// position depends only on the balls of the feet and on the state, as if the rear foot were flat.
 struct Ends {
-  DVec3 start;  // Positions of the pelvis; y is not used.
+  DVec3 start;
   DVec3 end;
   DVec3 end_velocity;
 };
@@ -62,8 +64,8 @@ Curve MakeSway(Foot moving, const StepTiming& timing) {
     sway = 0.036;  // The weight must move over one foot without momentum.
   }
   // Before a foot moves far sideways, the body leans to the other side.
-  const double natural = 2.0 * StandingBall(Foot::kLeft).x;
-  sway += 0.2 * std::max(0.0, std::fabs(timing.shape.end_m.x) - natural);
+  const double stand_width = 2.0 * StandingBall(Foot::kLeft).x;
+  sway += 0.2 * std::max(0.0, std::fabs(timing.shape.end_m.x) - stand_width);
   const double middle_s = timing.toe_off_s + (start.standing() ? 0.3 : 0.5) * timing.swing_s();
   const auto rate = [](const GaitState& state) {
     return state.standing() ? 0.0 : state.sway_m * 0.12 * std::numbers::pi / state.half_support_s;
@@ -107,15 +109,15 @@ Curve MakeTilt(const StepTiming& timing) {
                 {timing.end_s, end, 0.0}});
 }
 
-// Returns the height of the pelvis in a state with the moving foot `moved_m` from the fixed one:
-// the height of walking above the lower foot, limited by the reach of the legs with knees bent 12
-// degrees.
+// Returns the height of the pelvis in a state in which the moving foot is `moved_m` from the fixed
+// one. It is the height of walking above the lower foot, unless the legs with knees bent by 12
+// degrees do not reach that far.
 double StateHeight(const GaitState& state, const DVec3& moved_m) {
   const double low = std::min(0.0, moved_m.y);
   const double height = low + kStandingHipHeightM - state.pelvis_drop_m;
-  const double natural = 2.0 * StandingBall(Foot::kLeft).x;
+  const double stand_width = 2.0 * StandingBall(Foot::kLeft).x;
   const bool rolls = state.standing() || state.strike_pitch_rad > 0.0;
-  if (moved_m.y == 0.0 && rolls && std::fabs(moved_m.x - natural) < 1e-9) return height;
+  if (moved_m.y == 0.0 && rolls && std::fabs(moved_m.x - stand_width) < 1e-9) return height;
   const bool fixed_is_rear = moved_m.z >= 0.0;
   const DVec3 rear_ball = fixed_is_rear ? DVec3(0.0) : moved_m;
   const DVec3 front_ball = fixed_is_rear ? moved_m : DVec3(0.0);
@@ -127,11 +129,9 @@ double StateHeight(const GaitState& state, const DVec3& moved_m) {
   const DVec3 pelvis(kMiddleShare * moved_m.x, 0.0,
                      rear_ball.z - kBallAheadOfAnkleM * Cos(kToeOutRad) + state.pelvis_ahead_m);
   const double reach = ReachAtKnee(12.0 * kDegree);
-  const auto ceiling = [&](const DVec3& ankle, double out) {
-    const double dx = pelvis.x + out * kHipHalfWidthM - ankle.x, dz = pelvis.z - ankle.z;
-    return ankle.y + std::sqrt(std::max(0.0, reach * reach - dx * dx - dz * dz));
-  };
-  return std::min({height, ceiling(rear_ankle, side), ceiling(front_ankle, -side)});
+  const DVec3 to_rear_hip(side * kHipHalfWidthM, 0.0, 0.0);
+  return std::min({height, HighestHipM(pelvis + to_rear_hip, rear_ankle, reach),
+                   HighestHipM(pelvis - to_rear_hip, front_ankle, reach)});
 }
 
 // Converts a vector of a right step to that of the mirrored left step.
@@ -184,6 +184,7 @@ DVec3 PelvisPath::Position(double time_s) const {
 
 double PelvisPath::Heading(double time_s) const {
   if (timing_.shape.turn_rad == 0.0) return 0.0;
+  // SmootherStep, multiplied in the order that the bytes of the library depend on.
   const double s = std::clamp(time_s / timing_.end_s, 0.0, 1.0);
   return timing_.shape.turn_rad * s * s * s * (10.0 + s * (6.0 * s - 15.0));
 }
@@ -193,47 +194,39 @@ DQuat PelvisPath::Rotation(double time_s) const {
          RotateX(tilt_.At(time_s));
 }
 
-void PelvisPath::StayWithinReach(const FootPaths& feet) {
-  // Uses filters, since a fit of a few spline knots diverges: the limit has a kink where the legs
-  // change.
-  constexpr int kRounds = 3, kMaxHalf = 12, kSmoothHalf = 20;
+double PelvisPath::MissingReach(const FootPaths& feet, double time_s) const {
   const double reach = ReachAtKnee(kMinKneeRad);
-  std::vector<double> excess(kSamples), highest(kSamples);
+  const DVec3 root = Position(time_s);
+  const DQuat rotation = Rotation(time_s);
+  double missing = 0.0;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const DVec3 ankle = (foot == moving_ ? feet.Moving(time_s) : feet.Fixed(time_s)).ankle_m;
+    const DVec3 hip = root + rotation * DVec3(SideSign(foot) * kHipHalfWidthM, 0.0, 0.0);
+    missing = std::max(missing, hip.y - HighestHipM(hip, ankle, reach));
+  }
+  return missing;
+}
+
+void PelvisPath::StayWithinReach(const FootPaths& feet) {
+  // A fit of a few spline knots would diverge, because the limit has a kink where the other leg
+  // becomes the limiting one. Therefore the lowering is filtered.
+  constexpr int kRounds = 3, kMaximumHalf = 12, kMeanHalf = 20;
+  std::vector<double> weights;
+  for (int k = -kMeanHalf; k <= kMeanHalf; ++k) {
+    weights.push_back(1.0 + Cos(std::numbers::pi * k / (kMeanHalf + 1)));
+  }
+  std::vector<double> missing(kSamples);
   for (int round = 0; round < kRounds; ++round) {
     for (int i = 0; i < kSamples; ++i) {
-      const double time_s = timing_.end_s * i / (kSamples - 1);
-      const DVec3 root = Position(time_s);
-      const DQuat rotation = Rotation(time_s);
-      double over = 0.0;
-      for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-        const DVec3 ankle = (foot == moving_ ? feet.Moving(time_s) : feet.Fixed(time_s)).ankle_m;
-        const DVec3 hip = root + rotation * DVec3(SideSign(foot) * kHipHalfWidthM, 0.0, 0.0);
-        const double dx = hip.x - ankle.x, dz = hip.z - ankle.z;
-        const double ceiling =
-            ankle.y + std::sqrt(std::max(0.0, reach * reach - dx * dx - dz * dz));
-        over = std::max(over, hip.y - ceiling);
-      }
-      excess[static_cast<std::size_t>(i)] = over;
+      missing[static_cast<std::size_t>(i)] = MissingReach(feet, timing_.end_s * i / (kSamples - 1));
     }
+    const std::vector<double> smooth = MovingMean(MovingMaximum(missing, kMaximumHalf), weights);
     for (int i = 0; i < kSamples; ++i) {
-      double most = 0.0;
-      for (int k = std::max(0, i - kMaxHalf); k <= std::min(kSamples - 1, i + kMaxHalf); ++k) {
-        most = std::max(most, excess[static_cast<std::size_t>(k)]);
-      }
-      highest[static_cast<std::size_t>(i)] = most;
-    }
-    for (int i = 0; i < kSamples; ++i) {
-      double sum = 0.0, weights = 0.0;
-      for (int k = -kSmoothHalf; k <= kSmoothHalf; ++k) {
-        const double weight = 1.0 + Cos(std::numbers::pi * k / (kSmoothHalf + 1));
-        sum += weight * highest[static_cast<std::size_t>(std::clamp(i + k, 0, kSamples - 1))];
-        weights += weight;
-      }
-      // The states must not change. After a turn the rear foot does not have the direction of the
-      // state, so the end may change.
+      // Steps join in their states, so the pelvis must not change there. After a turn it may change
+      // at the end, because the rear foot does not have the direction of the state.
       const int to_state = timing_.shape.turn_rad == 0.0 ? std::min(i, kSamples - 1 - i) : i;
-      lowered_m_[static_cast<std::size_t>(i)] +=
-          sum / weights * Ease(to_state / (0.06 * (kSamples - 1)));
+      const auto k = static_cast<std::size_t>(i);
+      lowered_m_[k] += smooth[k] * SmoothStep(to_state / (0.06 * (kSamples - 1)));
     }
   }
 }

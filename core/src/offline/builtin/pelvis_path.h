@@ -24,6 +24,8 @@ class PelvisPath {
   [[nodiscard]] double Tilt(double time_s) const { return tilt_.At(time_s); }
 
  private:
+  // Returns by how much the pelvis is too high for the legs.
+  [[nodiscard]] double MissingReach(const FootPaths& feet, double time_s) const;
   void StayWithinReach(const FootPaths& feet);
 
   Foot moving_;

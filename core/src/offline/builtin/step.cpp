@@ -5,32 +5,18 @@
 #include <utility>
 
 #include "base/check.h"
-#include "offline/builtin/elementary.h"
+#include "base/easing.h"
 #include "offline/builtin/foot_path.h"
 #include "offline/builtin/leg_ik.h"
 #include "offline/builtin/pelvis_path.h"
 #include "offline/builtin/step_timing.h"
 #include "offline/builtin/upper_body_path.h"
+#include "runtime/weights/end_measures.h"
 
 namespace stridewire::builtin {
 namespace {
 
 constexpr double kHeadLeadS = 0.25;
-
-double ParameterOf(const StepShape& shape, ParameterName name) {
-  switch (name) {
-    case ParameterName::kStartX: return shape.start_m.x;
-    case ParameterName::kStartY: return shape.start_m.y;
-    case ParameterName::kStartZ: return shape.start_m.z;
-    case ParameterName::kEndX: return shape.end_m.x;
-    case ParameterName::kEndY: return shape.end_m.y;
-    case ParameterName::kEndZ: return shape.end_m.z;
-    case ParameterName::kTurn: return shape.turn_rad;
-    case ParameterName::kLength:
-    case ParameterName::kHeight: break;
-  }
-  return 0.0;
-}
 
 }  // namespace
 
@@ -46,12 +32,12 @@ FigurePose StandingPose() {
   return pose;
 }
 
-double NaturalSide() { return 2.0 * StandingBall(Foot::kLeft).x; }
+double StandWidthM() { return 2.0 * StandingBall(Foot::kLeft).x; }
 
 StepShape StraightShape(Foot moving, double start_length_m, double end_length_m) {
   StepShape shape;
-  shape.start_m = DVec3(SideSign(moving) * NaturalSide(), 0.0, -start_length_m);
-  shape.end_m = DVec3(SideSign(moving) * NaturalSide(), 0.0, end_length_m);
+  shape.start_m = DVec3(SideSign(moving) * StandWidthM(), 0.0, -start_length_m);
+  shape.end_m = DVec3(SideSign(moving) * StandWidthM(), 0.0, end_length_m);
   return shape;
 }
 
@@ -64,7 +50,9 @@ RawExample MakeStep(const Skeleton& figure, Foot moving, const StepShape& shape,
 
   RawExample example;
   example.keytimes_s = timing.keytimes_s();
-  for (const ParameterName name : names) example.parameters.push_back(ParameterOf(shape, name));
+  const EndMeasures ends = {
+      .start_m = shape.start_m, .end_m = shape.end_m, .heading_change_rad = shape.turn_rad};
+  for (const ParameterName name : names) example.parameters.push_back(ParameterOf(ends, name));
   example.heading_change_rad = shape.turn_rad;
   example.source = std::move(source);
   example.clip.fps = kClipFps;
@@ -80,7 +68,7 @@ RawExample MakeStep(const Skeleton& figure, Foot moving, const StepShape& shape,
     pose.rotations[kHips] = pelvis.Rotation(time_s);
     UpperBody body = upper.At(time_s);
     // People look in the direction in which they are about to walk.
-    body.head_yaw = (pelvis.Heading(time_s + kHeadLeadS) - heading) * Ease(time_s / 0.2);
+    body.head_yaw = (pelvis.Heading(time_s + kHeadLeadS) - heading) * SmoothStep(time_s / 0.2);
     SetUpperBody(body, pelvis.Yaw(time_s), pelvis.Roll(time_s), pelvis.Tilt(time_s), pose);
     SolveLeg(moving, feet.Moving(time_s), pose, heading);
     SolveLeg(OtherFoot(moving), feet.Fixed(time_s), pose, heading);

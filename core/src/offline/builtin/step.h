@@ -9,8 +9,8 @@
 
 namespace stridewire::builtin {
 
-/// Returns the sideways distance of the balls of a standing figure, in metres.
-[[nodiscard]] double NaturalSide();
+/// Returns the sideways distance between the balls of a standing figure, in metres.
+[[nodiscard]] double StandWidthM();
 
 /// Returns the shape of a straight step from feet `start_length_m` apart to `end_length_m` apart.
 [[nodiscard]] StepShape StraightShape(Foot moving, double start_length_m, double end_length_m);

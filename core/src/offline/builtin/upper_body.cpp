@@ -6,7 +6,7 @@ namespace {
 // Upper arms are turned inwards, so that bent elbows bring the hands in front of the body.
 constexpr double kInwardTurnRad = 18.0 * kDegree;
 
-DQuat Small(double yaw, double roll, double lean) {
+DQuat YawRollLean(double yaw, double roll, double lean) {
   return RotateY(yaw) * RotateZ(roll) * RotateX(lean);
 }
 
@@ -15,13 +15,13 @@ DQuat Small(double yaw, double roll, double lean) {
 void SetUpperBody(const UpperBody& body, double pelvis_yaw, double pelvis_roll, double pelvis_tilt,
                   FigurePose& pose) {
   const DQuat third =
-      Small((body.thorax_yaw - pelvis_yaw) / 3.0, (body.thorax_roll - pelvis_roll) / 3.0,
-            (body.thorax_lean - pelvis_tilt) / 3.0);
+      YawRollLean((body.thorax_yaw - pelvis_yaw) / 3.0, (body.thorax_roll - pelvis_roll) / 3.0,
+                  (body.thorax_lean - pelvis_tilt) / 3.0);
   pose.rotations[kLowerBack] = third;
   pose.rotations[kSpine] = third;
   pose.rotations[kSpine1] = third;
-  const DQuat neck = Small((body.head_yaw - body.thorax_yaw) / 3.0, -body.thorax_roll / 3.0,
-                           (body.head_nod - body.thorax_lean) / 3.0);
+  const DQuat neck = YawRollLean((body.head_yaw - body.thorax_yaw) / 3.0, -body.thorax_roll / 3.0,
+                                 (body.head_nod - body.thorax_lean) / 3.0);
   pose.rotations[kNeck] = neck;
   pose.rotations[kNeck1] = neck;
   pose.rotations[kHead] = neck;

@@ -5,8 +5,8 @@
 #include <numbers>
 #include <vector>
 
+#include "base/easing.h"
 #include "base/trig.h"
-#include "offline/builtin/elementary.h"
 
 namespace stridewire::builtin {
 namespace {
@@ -47,7 +47,7 @@ Curve PerStride(const StepTiming& timing, const Oscillation& start, const Oscill
   if (!timing.start.standing() && start.lag > 0.0) {
     const double u = start.lag;
     knots.push_back({u * timing.end_s,
-                     Mix(start.middle + start.amplitude, end.middle + end.amplitude, Ease(u)),
+                     Mix(start.middle + start.amplitude, end.middle + end.amplitude, SmoothStep(u)),
                      0.0});
   }
   knots.push_back({timing.end_s, last, -SlopeOf(end, 0.5, timing.end)});

@@ -4,35 +4,87 @@
 #include <cmath>
 
 #include "base/trig.h"
+#include "offline/base/degrees.h"
 #include "offline/base/text.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire::complete {
 namespace {
 
-// Limits of a stand. Captured stands have knees within 10 degrees of each other. People bend them
-// by up to 36 degrees, but a figure that crouches all the time may stand so as well.
-constexpr double kStandAheadM = 0.12;
-constexpr double kStandRiseM = 0.04;
-constexpr double kNarrowestM = 0.04;
-constexpr double kWidestM = 0.5;
+// A captured pose is a stand if it is within these limits: distances of the feet in each direction,
+// bend of the knees, and difference of their bends. In captured stands people bend their knees by
+// up to 36 degrees, with less than 10 degrees between them. The limits are wider, because some
+// captured characters crouch all the time.
+constexpr double kMaxFeetAheadM = 0.12;
+constexpr double kMaxFeetRiseM = 0.04;
+constexpr double kMinFeetWidthM = 0.04;
+constexpr double kMaxFeetWidthM = 0.5;
 constexpr double kMaxKneeRad = 1.2;
 constexpr double kMaxKneeDifferenceRad = 0.28;
 
-constexpr double kStandKneeRad = 0.2;  // Bend of the straighter knee in a composed stand.
+// Composed stands.
+constexpr double kStandKneeRad = 0.2;  // Bend of the straighter knee.
 constexpr double kMinStandWidthM = 0.16;
 constexpr double kMaxStandWidthM = 0.24;
 constexpr double kHipsAheadM = 0.03;  // The hips are this far ahead of the ankles.
-// Generic time at which the fixed foot is flat: the other foot swings past it.
-constexpr double kFlat = 1.3;
+// Generic time at which the sole of the fixed foot is flat, because the other foot swings past it.
+constexpr double kFlatSoleTime = 1.3;
 
+// Returns the bend of a knee: 0 if the leg is straight.
 double KneeRad(const LegRig::Side& side, const LegPose& leg) {
-  const auto at = [&](int place) {
-    return DVec3(leg.positions_m[static_cast<std::size_t>(place)]);
+  const auto at = [&](int joint) {
+    return DVec3(leg.positions_m[static_cast<std::size_t>(joint)]);
   };
   const DVec3 thigh = at(side.knee) - at(side.hip);
   const DVec3 shank = at(side.ankle) - at(side.knee);
   return Acos(glm::dot(thigh, shank) / std::sqrt(glm::dot(thigh, thigh) * glm::dot(shank, shank)));
+}
+
+// Averages the postures of steps, and the feet while their soles are flat. The width of the stand
+// stays 0.
+class StandAverage {
+ public:
+  void AddPosture(const PostureSample& sample) {
+    posture_count_ += 1.0;
+    parts_.mean = posture_count_ == 1.0 ? sample : Blend(parts_.mean, sample, 1.0 / posture_count_);
+  }
+
+  void AddSole(Foot foot, const PostureSample& sample) {
+    const auto f = static_cast<std::size_t>(foot);
+    sole_count_[f] += 1.0;
+    const double share = 1.0 / sole_count_[f];
+    DQuat& ankle = parts_.ankles[f];
+    ankle = sole_count_[f] == 1.0 ? sample.ankles[f] : Blend(ankle, sample.ankles[f], share);
+    parts_.ball_y_m[f] += share * (sample.balls_m[f].y - parts_.ball_y_m[f]);
+  }
+
+  [[nodiscard]] bool has_sole(Foot foot) const {
+    return sole_count_[static_cast<std::size_t>(foot)] > 0.0;
+  }
+  [[nodiscard]] const StandParts& parts() const { return parts_; }
+
+ private:
+  StandParts parts_;
+  double posture_count_ = 0.0;
+  std::array<double, 2> sole_count_{};  // [Foot]
+};
+
+bool IsCapturedStep(const RawGroup& group) { return IsStep(group.kind) && !group.is_completed; }
+
+// Calls use(point, sample) twice per keytime interval of every example of a group of steps.
+template <class Use>
+void ForEachSample(const Skeleton& skeleton, const RawGroup& group, const Use& use) {
+  for (const RawExample& example : group.examples) {
+    Clip clip = example.clip;
+    MakeSignContinuous(clip);
+    Pose pose(skeleton.joint_count());
+    for (std::size_t p = 0; p < kPointCount; p += kPointsPerInterval / 2) {
+      SampleClip(clip, TimeAtPoint(example.keytimes_s, p), pose);
+      const double heading_rad = example.heading_change_rad * static_cast<double>(p) /
+                                 static_cast<double>(kPointCount - 1);
+      use(p, SampleOf(skeleton, pose, heading_rad));
+    }
+  }
 }
 
 }  // namespace
@@ -40,13 +92,13 @@ double KneeRad(const LegRig::Side& side, const LegPose& leg) {
 std::optional<std::string> WhyNoStand(const Skeleton& skeleton, const LegRig& rig,
                                       const Pose& pose) {
   const DVec3 apart = FootVector(skeleton, pose, Foot::kLeft, 0.0);
-  if (std::fabs(apart.z) > kStandAheadM) {
+  if (std::fabs(apart.z) > kMaxFeetAheadM) {
     return Text("one foot is %.2f m ahead of the other", std::fabs(apart.z));
   }
-  if (std::fabs(apart.y) > kStandRiseM) {
+  if (std::fabs(apart.y) > kMaxFeetRiseM) {
     return Text("one foot is %.2f m higher than the other", std::fabs(apart.y));
   }
-  if (apart.x < kNarrowestM || apart.x > kWidestM) {
+  if (apart.x < kMinFeetWidthM || apart.x > kMaxFeetWidthM) {
     return Text("the feet are %.2f m apart sideways", apart.x);
   }
   std::array<double, 2> knees{};
@@ -55,18 +107,17 @@ std::optional<std::string> WhyNoStand(const Skeleton& skeleton, const LegRig& ri
     EvaluateLeg(skeleton, rig, pose, foot, leg);
     knees[static_cast<std::size_t>(foot)] = KneeRad(rig.side(foot), leg);
   }
-  constexpr double kDegrees = 57.29577951308232;
   if (std::max(knees[0], knees[1]) > kMaxKneeRad) {
-    return Text("a knee is bent by %.0f degrees", kDegrees * std::max(knees[0], knees[1]));
+    return Text("a knee is bent by %.0f degrees", kDegreesPerRadian * std::max(knees[0], knees[1]));
   }
   if (std::fabs(knees[0] - knees[1]) > kMaxKneeDifferenceRad) {
     return Text("one knee is bent by %.0f degrees more than the other",
-                kDegrees * std::fabs(knees[0] - knees[1]));
+                kDegreesPerRadian * std::fabs(knees[0] - knees[1]));
   }
   return std::nullopt;
 }
 
-StandParts PartsOf(const std::array<StrideModel, 2>& strides) {
+StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides) {
   StandParts parts;
   parts.mean = strides[0].points.front();
   double count = 0.0;
@@ -78,7 +129,7 @@ StandParts PartsOf(const std::array<StrideModel, 2>& strides) {
   }
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
-    const PostureSample flat = strides[static_cast<std::size_t>(OtherFoot(foot))].At(kFlat);
+    const PostureSample flat = strides[static_cast<std::size_t>(OtherFoot(foot))].At(kFlatSoleTime);
     parts.ankles[f] = flat.ankles[f];
     parts.ball_y_m[f] = flat.balls_m[f].y;
   }
@@ -86,55 +137,30 @@ StandParts PartsOf(const std::array<StrideModel, 2>& strides) {
   return parts;
 }
 
-std::optional<StandParts> PartsOf(const RawLibrary& library) {
-  StandParts parts;
-  double count = 0.0;
-  std::array<double, 2> soles{};
-  const auto add_sole = [&](Foot foot, const PostureSample& sample) {
-    const auto f = static_cast<std::size_t>(foot);
-    soles[f] += 1.0;
-    const double share = 1.0 / soles[f];
-    parts.ankles[f] =
-        soles[f] == 1.0 ? sample.ankles[f] : Blend(parts.ankles[f], sample.ankles[f], share);
-    parts.ball_y_m[f] += share * (sample.balls_m[f].y - parts.ball_y_m[f]);
-  };
-  const auto visit = [&](const RawGroup& group, auto use) {
-    for (const RawExample& example : group.examples) {
-      Clip clip = example.clip;
-      MakeSignContinuous(clip);
-      Pose pose(library.skeleton.joint_count());
-      for (std::size_t p = 0; p < kPointCount; p += kPointsPerInterval / 2) {
-        SampleClip(clip, TimeAtPoint(example.keytimes_s, p), pose);
-        const double heading = example.heading_change_rad * static_cast<double>(p) /
-                               static_cast<double>(kPointCount - 1);
-        use(MovingFoot(group.kind), p, SampleOf(library.skeleton, pose, heading));
-      }
-    }
-  };
+std::optional<StandParts> MeasureStandParts(const RawLibrary& library) {
+  StandAverage average;
   for (const RawGroup& group : library.groups) {
-    if (!IsStep(group.kind) || group.is_completed) continue;
-    visit(group, [&](Foot moving, std::size_t p, const PostureSample& sample) {
-      count += 1.0;
-      parts.mean = count == 1.0 ? sample : Blend(parts.mean, sample, 1.0 / count);
-      if (p == kPointsPerInterval * 3 / 2) add_sole(OtherFoot(moving), sample);
+    if (!IsCapturedStep(group)) continue;
+    const Foot fixed = OtherFoot(MovingFoot(group.kind));
+    ForEachSample(library.skeleton, group, [&](std::size_t point, const PostureSample& sample) {
+      average.AddPosture(sample);
+      if (point == kPointsPerInterval * 3 / 2) average.AddSole(fixed, sample);
     });
   }
-  if (count == 0.0) return std::nullopt;
-  // If only one foot steps, it is seen flat only after its landing.
+  // If all steps are of the same foot, its sole is flat only after it has landed.
   for (const RawGroup& group : library.groups) {
-    if (!IsStep(group.kind) || group.is_completed) continue;
-    if (soles[static_cast<std::size_t>(MovingFoot(group.kind))] > 0.0) continue;
-    visit(group, [&](Foot moving, std::size_t p, const PostureSample& sample) {
-      if (p == kPointCount - 1) add_sole(moving, sample);
+    if (!IsCapturedStep(group) || average.has_sole(MovingFoot(group.kind))) continue;
+    ForEachSample(library.skeleton, group, [&](std::size_t point, const PostureSample& sample) {
+      if (point == kPointCount - 1) average.AddSole(MovingFoot(group.kind), sample);
     });
   }
-  if (soles[0] == 0.0 || soles[1] == 0.0) return std::nullopt;
-  parts.width_m = 0.0;  // The smallest width of a stand.
-  return parts;
+  if (!average.has_sole(Foot::kLeft) || !average.has_sole(Foot::kRight)) return std::nullopt;
+  return average.parts();
 }
 
 Pose ComposeStand(const Skeleton& skeleton, const LegRig& rig, const StandParts& parts) {
   const double width_m = std::clamp(parts.width_m, kMinStandWidthM, kMaxStandWidthM);
+  // Place the feet, and the root between them.
   PostureSample mean = parts.mean;
   mean.root_m = DVec3(0.0);
   Pose pose = ToPose(mean);
@@ -149,12 +175,13 @@ Pose ComposeStand(const Skeleton& skeleton, const LegRig& rig, const StandParts&
     const auto ankle = static_cast<std::size_t>(side.ankle);
     const DVec3 sole = parts.ankles[f] * (glm::conjugate(DQuat(legs[f].world_rotations[ankle])) *
                                           DVec3(legs[f].ball_m - legs[f].positions_m[ankle]));
-    const DVec3 ball((foot == Foot::kLeft ? 0.5 : -0.5) * width_m, parts.ball_y_m[f], 0.0);
+    const DVec3 ball(0.5 * SideSign(foot) * width_m, parts.ball_y_m[f], 0.0);
     ankles_m[f] = ball - sole;
     hips_m += 0.5 * DVec3(legs[f].positions_m[static_cast<std::size_t>(side.hip)]);
     middle_m += 0.5 * ankles_m[f];
   }
   DVec3 root(middle_m.x - hips_m.x, 0.0, middle_m.z + kHipsAheadM - hips_m.z);
+  // Lower the root until the straighter leg has the bend kStandKneeRad.
   root.y = HUGE_VAL;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);

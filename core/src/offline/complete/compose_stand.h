@@ -15,23 +15,23 @@ namespace stridewire::complete {
 [[nodiscard]] std::optional<std::string> WhyNoStand(const Skeleton& skeleton, const LegRig& rig,
                                                     const Pose& pose);
 
-/// What is needed to compose a stand pose.
+/// Measurements of a walk from which a stand pose is composed.
 struct StandParts {
   PostureSample mean;                ///< Mean posture; its root and feet are not used.
-  std::array<DQuat, 2> ankles;       ///< [Foot]: rotation of the ankle with the sole on the ground.
-  std::array<double, 2> ball_y_m{};  ///< [Foot]: height of the resting ball.
+  std::array<DQuat, 2> ankles;       ///< [Foot]: rotation of the ankle while the sole is flat.
+  std::array<double, 2> ball_y_m{};  ///< [Foot]: height of the ball while the sole is flat.
   double width_m = 0.0;              ///< Sideways distance of the feet.
 };
 
-/// Returns the mean posture of strides, in which the swings of arms and pelvis cancel out, and the
-/// soles in the middle of single support, when they are flat.
-[[nodiscard]] StandParts PartsOf(const std::array<StrideModel, 2>& strides);
+/// Measures mean strides. Over both strides, the swings of arms and pelvis cancel out. The soles
+/// are flat in the middle of single support.
+[[nodiscard]] StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides);
 
-/// The same for all steps of a library, if there are no level strides straight ahead. Returns
-/// nullopt if there are no steps.
-[[nodiscard]] std::optional<StandParts> PartsOf(const RawLibrary& library);
+/// Measures all captured steps of a library, if it contains no level strides straight ahead.
+/// Returns nullopt if the steps do not show the soles of both feet flat on the ground.
+[[nodiscard]] std::optional<StandParts> MeasureStandParts(const RawLibrary& library);
 
-/// Composes a stand pose with the feet side by side and knees that are nearly straight.
+/// Composes a stand pose with the feet side by side and nearly straight knees.
 [[nodiscard]] Pose ComposeStand(const Skeleton& skeleton, const LegRig& rig,
                                 const StandParts& parts);
 

@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "runtime/library/convex_hull.h"
+#include "runtime/weights/end_measures.h"
+#include "runtime/weights/measure.h"
 
 namespace stridewire::complete {
 namespace {
@@ -14,29 +16,15 @@ namespace {
 constexpr double kCloseM = 0.06;
 // Sideways tolerance of groups without sideways parameters.
 constexpr double kSideSlackM = 0.12;
-constexpr double kMetresPerRadian = 0.5;
 constexpr double kHullGrowth = 0.1;
-
-double ValueOf(const StepFeet& feet, ParameterName name) {
-  switch (name) {
-    case ParameterName::kStartX: return feet.start_m.x;
-    case ParameterName::kStartY: return feet.start_m.y;
-    case ParameterName::kStartZ: return feet.start_m.z;
-    case ParameterName::kEndX: return feet.end_m.x;
-    case ParameterName::kEndY: return feet.end_m.y;
-    case ParameterName::kEndZ: return feet.end_m.z;
-    case ParameterName::kTurn: return feet.turn_rad;
-    case ParameterName::kLength:
-    case ParameterName::kHeight: break;
-  }
-  return 0.0;
-}
 
 double DistanceTo(const RawGroup& group, const StepFeet& feet, double stand_side_m) {
   std::vector<double> points;
   for (const RawExample& example : group.examples) {
     points.insert(points.end(), example.parameters.begin(), example.parameters.end());
   }
+  const EndMeasures ends = {
+      .start_m = feet.start_m, .end_m = feet.end_m, .heading_change_rad = feet.turn_rad};
   std::array<double, kMaxParameters> metric{};
   std::array<double, kMaxParameters> target{};
   std::array<double, kMaxParameters> nearest{};
@@ -50,7 +38,7 @@ double DistanceTo(const RawGroup& group, const StepFeet& feet, double stand_side
     has_end_x |= name == ParameterName::kEndX;
     has_turn |= name == ParameterName::kTurn;
     metric[l] = name == ParameterName::kTurn ? kMetresPerRadian : 1.0;
-    target[l] = ValueOf(feet, name);
+    target[l] = ParameterOf(ends, name);
   }
   const auto beyond_slack = [&](double side_m) {
     return std::max(0.0, std::fabs(side_m - stand_side_m) - kSideSlackM);

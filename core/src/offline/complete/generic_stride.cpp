@@ -1,8 +1,7 @@
 #include "offline/complete/generic_stride.h"
 
 #include <algorithm>
-#include <cmath>
-#include <utility>
+#include <numbers>
 
 #include "base/trig.h"
 #include "offline/build/pose_error.h"
@@ -12,37 +11,38 @@
 namespace stridewire::complete {
 namespace {
 
-constexpr double kGenericLengthM = 0.55;  // Of the generated figure.
+constexpr double kStrideLengthM = 0.55;  // For a person with the legs of the generated figure.
 constexpr double kArmSwingRad = 0.2;
-// The first joint of an arm with a longer bone below it is the upper arm.
+// The bones of upper arms are at least this long, those of collar bones and shoulder blades are
+// shorter.
 constexpr float kUpperArmM = 0.15f;
-constexpr double kPi = 3.14159265358979323846;
 
 struct UpperArm {
-  std::size_t joint = 0;
+  std::size_t joint = 0;  // The joint at the shoulder, which moves the upper arm.
   bool is_left = false;
 };
 
-// Returns the upper arms of a skeleton, as far as they can be found.
+// Returns the upper arm of each side: the first bone of the arm, from the trunk outward, that is at
+// least kUpperArmM long. Returns fewer than two if the skeleton has no such bones.
 std::vector<UpperArm> FindUpperArms(const Skeleton& skeleton, const Pose& stand) {
   const std::vector<BodyPart> parts = FindBodyParts(skeleton, stand);
   std::vector<Vec3> positions(skeleton.joints.size());
   std::vector<Quat> rotations(skeleton.joints.size());
   ForwardKinematics(skeleton, stand, positions, rotations);
   std::vector<UpperArm> arms;
-  std::vector<bool> is_below(skeleton.joints.size(), false);
+  std::vector<bool> is_in_arm(skeleton.joints.size(), false);
   for (std::size_t j = 1; j < skeleton.joints.size(); ++j) {
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
-    is_below[j] = is_below[parent];
-    if (is_below[j] || parts[parent] != BodyPart::kArms) continue;
+    is_in_arm[j] = is_in_arm[parent];
+    if (is_in_arm[j] || parts[parent] != BodyPart::kArms) continue;
     if (glm::length(skeleton.joints[j].offset_m) < kUpperArmM) continue;
     arms.push_back({parent, positions[parent].x > positions[0].x});
-    is_below[j] = true;
+    is_in_arm[j] = true;
   }
   return arms;
 }
 
-// Turns an arm about the axis that points to the left. Positive angles move it forward.
+// Turns an arm about the sideways axis of the body. Positive angles move it forward.
 void SwingArm(const Skeleton& skeleton, const UpperArm& arm, double forward_rad,
               PostureSample& sample) {
   DQuat above(1.0, 0.0, 0.0, 0.0);
@@ -60,53 +60,74 @@ PostureSample StandOfFigure(const Skeleton& figure) {
   return SampleOf(figure, pose, 0.0);
 }
 
+// Returns the root of a sample relative to the middle between the balls of the feet.
+DVec3 RootFromBalls(const PostureSample& sample) {
+  return sample.root_m - 0.5 * (sample.balls_m[0] + sample.balls_m[1]);
+}
+
+// Poses a person like the generated figure: pelvis and feet deviate from the stand pose of the
+// person as those of the figure deviate from its own, scaled with the legs.
+class PoseTransfer {
+ public:
+  PoseTransfer(const Skeleton& figure, const PostureSample& stand, double scale)
+      : figure_stand_(StandOfFigure(figure)), stand_(stand), scale_(scale) {}
+
+  [[nodiscard]] PostureSample ToPerson(const PostureSample& from, Foot fixed) const {
+    DVec3 origin = from.balls_m[static_cast<std::size_t>(fixed)];
+    origin.y = 0.0;
+    const DVec3 root = RootFromBalls(stand_);
+    const DVec3 figure_root = RootFromBalls(figure_stand_);
+    PostureSample to = stand_;
+    to.root_m = scale_ * (from.root_m - origin);
+    to.root_m.x += root.x - scale_ * figure_root.x;
+    to.root_m.y = stand_.root_m.y + scale_ * (from.root_m.y - figure_stand_.root_m.y);
+    to.root_m.z += root.z - scale_ * figure_root.z;
+    to.rotations[0] =
+        from.rotations[0] * glm::conjugate(figure_stand_.rotations[0]) * stand_.rotations[0];
+    for (std::size_t f = 0; f < 2; ++f) {
+      to.ankles[f] = from.ankles[f] * glm::conjugate(figure_stand_.ankles[f]) * stand_.ankles[f];
+      to.balls_m[f] = scale_ * (from.balls_m[f] - origin);
+      to.balls_m[f].y =
+          stand_.balls_m[f].y + scale_ * (from.balls_m[f].y - figure_stand_.balls_m[f].y);
+    }
+    return to;
+  }
+
+ private:
+  PostureSample figure_stand_;
+  const PostureSample& stand_;
+  double scale_;
+};
+
 }  // namespace
 
 StrideModel GenericStride(const Skeleton& skeleton, const LegRig& rig, const PostureSample& stand,
                           Foot moving) {
   const Skeleton figure = builtin::MakeFigure();
-  const PostureSample figure_stand = StandOfFigure(figure);
   const RawExample example = builtin::MakeStep(
-      figure, moving, builtin::StraightShape(moving, kGenericLengthM, kGenericLengthM), {}, "");
+      figure, moving, builtin::StraightShape(moving, kStrideLengthM, kStrideLengthM), {}, "");
   const LegRig::Side& side = rig.side(moving);
   const double scale = (side.thigh_m + side.shank_m) / (builtin::kThighM + builtin::kShankM);
-  const auto fixed = static_cast<std::size_t>(OtherFoot(moving));
-  const DVec3 stand_root = stand.root_m - 0.5 * (stand.balls_m[0] + stand.balls_m[1]);
-  const DVec3 figure_root =
-      figure_stand.root_m - 0.5 * (figure_stand.balls_m[0] + figure_stand.balls_m[1]);
+  const PoseTransfer transfer(figure, stand, scale);
   const std::vector<UpperArm> arms = FindUpperArms(skeleton, ToPose(stand));
 
   StrideModel model;
   for (std::size_t p = 0; p < kPointCount; ++p) {
     Pose pose(figure.joint_count());
     SampleClip(example.clip, TimeAtPoint(example.keytimes_s, p), pose);
-    PostureSample from = SampleOf(figure, pose, 0.0);
-    DVec3 origin = from.balls_m[fixed];
-    origin.y = 0.0;
-    PostureSample& point = model.points.emplace_back(stand);
-    point.root_m = scale * (from.root_m - origin);
-    point.root_m.x += stand_root.x - scale * figure_root.x;
-    point.root_m.y = stand.root_m.y + scale * (from.root_m.y - figure_stand.root_m.y);
-    point.root_m.z += stand_root.z - scale * figure_root.z;
-    point.rotations[0] =
-        from.rotations[0] * glm::conjugate(figure_stand.rotations[0]) * stand.rotations[0];
-    for (std::size_t f = 0; f < 2; ++f) {
-      point.ankles[f] = from.ankles[f] * glm::conjugate(figure_stand.ankles[f]) * stand.ankles[f];
-      point.balls_m[f] = scale * (from.balls_m[f] - origin);
-      point.balls_m[f].y =
-          stand.balls_m[f].y + scale * (from.balls_m[f].y - figure_stand.balls_m[f].y);
-    }
-    const double swing =
-        kArmSwingRad * Cos(kPi * static_cast<double>(p) / static_cast<double>(kPointCount - 1));
+    PostureSample& point = model.points.emplace_back(
+        transfer.ToPerson(SampleOf(figure, pose, 0.0), OtherFoot(moving)));
+    const double swing_rad = kArmSwingRad * Cos(std::numbers::pi * static_cast<double>(p) /
+                                                static_cast<double>(kPointCount - 1));
     for (const UpperArm& arm : arms) {
       // The moving foot is behind at the start, so the arm of its side is in front.
-      const bool is_with_moving = arm.is_left == (moving == Foot::kLeft);
-      SwingArm(skeleton, arm, is_with_moving ? swing : -swing, point);
+      const bool is_on_moving_side = arm.is_left == (moving == Foot::kLeft);
+      SwingArm(skeleton, arm, is_on_moving_side ? swing_rad : -swing_rad, point);
     }
   }
   std::ranges::copy(example.keytimes_s, model.keytimes_s.begin());
-  model.start_length_m = model.end_length_m = scale * kGenericLengthM;
-  model.width_m = scale * builtin::NaturalSide();
+  model.start_length_m = model.end_length_m = scale * kStrideLengthM;
+  model.width_m = scale * builtin::StandWidthM();
   return model;
 }
 

@@ -9,11 +9,8 @@
 
 namespace stridewire::complete {
 
-/// Returns the sign of x on the outer side of a foot: +1 for the left, -1 for the right foot.
-[[nodiscard]] constexpr double Outward(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
-
-/// A pose in double precision, together with the feet that it is to have. Rotations of the world
-/// are relative to the heading.
+/// A pose in double precision, and the feet that inverse kinematics gives it. World rotations are
+/// relative to the heading.
 struct PostureSample {
   DVec3 root_m = DVec3(0.0);
   /// [joint]: rotation relative to the parent; that of the root is relative to the heading.
@@ -22,9 +19,10 @@ struct PostureSample {
   std::array<DVec3, 2> balls_m{DVec3(0.0), DVec3(0.0)};  ///< [Foot]: position of the ball.
 };
 
-/// Returns the normalised linear blend of two rotations along the short arc. It uses only square
-/// roots and divisions, so that the result has the same bits on every machine. It commutes with
-/// constant rotations on both sides, so that it does not depend on the axes of joints.
+/// Returns the normalised linear blend of two rotations along the shorter arc. Its functions are
+/// exactly rounded, so that the result has the same bits on every machine. If both rotations are
+/// multiplied by a constant rotation on either side, the result is multiplied in the same way.
+/// Therefore it does not depend on the axes of joints.
 [[nodiscard]] DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b);
 
 /// Returns a + share (b - a) of every part of two samples.

@@ -4,68 +4,56 @@
 #include <cmath>
 #include <utility>
 
-#include "base/check.h"
+#include "base/easing.h"
 #include "base/trig.h"
-#include "offline/builtin/elementary.h"
-#include "runtime/skeleton/foot_vector.h"
+#include "offline/base/moving_window.h"
+#include "offline/builtin/leg_ik.h"
+#include "offline/builtin/mirror.h"
+#include "offline/builtin/swing_detour.h"
+#include "offline/extract/extract.h"
 
 namespace stridewire::complete {
 namespace {
 
-using builtin::Ease;
-
 constexpr double kFps = 120.0;
 
-// Timing of steps from and to a stand, where the weight has to move without momentum.
+// Steps from a stand begin with a shift of the weight, which takes time because the body has no
+// momentum. Steps to a stand end with settling.
 constexpr double kWeightShiftS = 0.28;
 constexpr double kSettleS = 0.24;
-// The same for steps that begin and end in a stand, as in turns on the spot.
+// The same for steps that begin and end in a stand, such as turns on the spot.
 constexpr double kWeightShiftInPlaceS = 0.18;
 constexpr double kSettleInPlaceS = 0.15;
 constexpr double kMinSwingS = 0.36;
 constexpr double kMaxSwingS = 0.62;
-// Steps backward take longer than the same steps forward.
-constexpr double kBackwardSlower = 1.15;
+// A step backward takes this many times as long as the same step forward.
+constexpr double kBackwardSlowdown = 1.15;
 
-// The foot leaves its place a little before the toe-off that was detected in the captures, and
-// rests a little after the heel-strike.
+// Generic times between which the moving foot changes its place. It leaves the ground a little
+// before the toe-off that was detected in the captures, and rests a little after the heel-strike.
 constexpr double kSwingBegin = 0.92;
 constexpr double kSwingEnd = 2.06;
-// Least share of the captured swing in the pitch and the height of the swinging foot.
+// In the middle of a swing, pitch and height of the foot contain at least this share of the
+// captured stride, so that the feet do not drag in short steps.
 constexpr double kMinSwingShare = 0.45;
 constexpr double kClearanceM = 0.024;
 constexpr double kTipClearanceM = 0.02;
 constexpr double kLiftStepM = 0.004;
 constexpr double kMaxLiftM = 0.12;
-constexpr double kFootWidthM = 0.09;  // Least distance between feet that pass each other.
-constexpr double kBowStepM = 0.01;
-constexpr double kMaxBowM = 0.35;
+constexpr builtin::DetourRange kDetours = {.max_m = 0.35, .step_m = 0.01, .clearance_m = 0.09};
 
 // Shift of the weight over the fixed foot in steps from and to a stand, as a share of the distance
 // to that foot.
 constexpr double kSwayShare = 0.45;
-// The share of a stride in a state is limited, because more than a full stride is extrapolated.
+// Largest share of the captured stride. Shares above 1 extrapolate it.
 constexpr double kMaxShare = 1.15;
 // Legs are at most this straight, unless the stand pose is straighter.
 constexpr double kMaxExtension = 0.996;
-constexpr int kReachHalf = 10;  // Half width of the filters that lower the root, in samples.
 
 std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
 
-// Quintic from 0 to 1 with zero velocity and acceleration at both ends.
-double Smooth(double x) {
-  const double s = std::clamp(x, 0.0, 1.0);
-  return s * s * s * (10.0 + s * (6.0 * s - 15.0));
-}
-
-// A bump of height 1 with zero velocity at both ends of [0, 1].
-double Bump(double x) {
-  const double s = std::clamp(x, 0.0, 1.0);
-  return 16.0 * s * s * (1.0 - s) * (1.0 - s);
-}
-
-// A cubic curve between two positions and velocities.
-struct Cubic {
+// The cubic curve with given positions and velocities at both ends.
+struct HermiteCurve {
   DVec3 from = DVec3(0.0);
   DVec3 from_velocity = DVec3(0.0);
   DVec3 to = DVec3(0.0);
@@ -117,29 +105,8 @@ class StepGenerator {
       std::ranges::copy(pose.rotations, out.rotations.begin());
     }
     MakeSignContinuous(example.clip);
-    SetParameters(names, example);
+    MeasureStepParameters(person_.skeleton, names, moving_, example);
     return example;
-  }
-
-  void SetParameters(std::span<const ParameterName> names, RawExample& example) const {
-    const Clip& clip = example.clip;
-    const DVec3 start = FootVector(person_.skeleton, clip.frame(0), moving_, 0.0);
-    const DVec3 end = FootVector(person_.skeleton, clip.frame(clip.frame_count() - 1), moving_,
-                                 example.heading_change_rad);
-    example.parameters.clear();
-    for (const ParameterName name : names) {
-      switch (name) {
-        case ParameterName::kStartX: example.parameters.push_back(start.x); break;
-        case ParameterName::kStartY: example.parameters.push_back(start.y); break;
-        case ParameterName::kStartZ: example.parameters.push_back(start.z); break;
-        case ParameterName::kEndX: example.parameters.push_back(end.x); break;
-        case ParameterName::kEndY: example.parameters.push_back(end.y); break;
-        case ParameterName::kEndZ: example.parameters.push_back(end.z); break;
-        case ParameterName::kTurn: example.parameters.push_back(example.heading_change_rad); break;
-        case ParameterName::kLength:
-        case ParameterName::kHeight: STRIDEWIRE_CHECK(false); break;
-      }
-    }
   }
 
  private:
@@ -172,10 +139,10 @@ class StepGenerator {
     return keys[i] + (generic - static_cast<double>(i)) * (keys[i + 1] - keys[i]);
   }
   [[nodiscard]] double ShareAt(double time_s) const {
-    return start_share_ + (end_share_ - start_share_) * Smooth(time_s / end_s_);
+    return start_share_ + (end_share_ - start_share_) * SmootherStep(time_s / end_s_);
   }
   [[nodiscard]] double HeadingAt(double time_s) const {
-    return feet_.turn_rad * Smooth(time_s / end_s_);
+    return feet_.turn_rad * SmootherStep(time_s / end_s_);
   }
   // Progress of the swing, 0 to 1.
   static double SwingAt(double generic) {
@@ -203,10 +170,10 @@ class StepGenerator {
     root_.to_velocity = RotateYaw(feet_.turn_rad, end_share_ * stride_.end_velocity);
     // A cubic curve would overshoot if it had to cover a short distance from a high speed.
     const auto limit = [&](DVec3& velocity) {
-      const DVec3 way = root_.to - root_.from;
-      const double most = 3.0 * std::hypot(way.x, way.z) / end_s_;
+      const DVec3 path = root_.to - root_.from;
+      const double max_speed = 3.0 * std::hypot(path.x, path.z) / end_s_;
       const double speed = std::hypot(velocity.x, velocity.z);
-      if (speed > most && speed > 0.0) velocity *= most / speed;
+      if (speed > max_speed && speed > 0.0) velocity *= max_speed / speed;
     };
     limit(root_.from_velocity);
     limit(root_.to_velocity);
@@ -219,7 +186,8 @@ class StepGenerator {
     const double share = std::min(1.0, ShareAt(time_s));
     const DVec3 deviation = stride_.At(generic).root_m - captured_.At(CapturedTimeAt(generic));
     const double heading = HeadingAt(time_s);
-    // The fixed ball is the origin. Momentum replaces a part of the shift of the weight.
+    // The ball of the fixed foot is the origin, and the root is midway between the feet. In
+    // strides, momentum carries the body, so that less weight has to shift.
     const double to_fixed_m = -0.5 * (feet_.start_m.x + feet_.end_m.x) * 0.5;
     const DVec3 sway(kSwayShare * (1.0 - share) * to_fixed_m * Bump(time_s / end_s_), 0.0, 0.0);
     return root_.At(time_s) + RotateYaw(heading, share * deviation + sway);
@@ -234,10 +202,10 @@ class StepGenerator {
     if (foot == fixed_) return ball;
     const double swing = SwingAt(generic);
     const DVec3 end = RotateYaw(feet_.turn_rad, feet_.end_m);
-    const DVec3 place = feet_.start_m + Smooth(swing) * (end - feet_.start_m);
-    const DVec3 outward = RotateYaw(0.5 * feet_.turn_rad, DVec3(Outward(moving_), 0.0, 0.0));
-    ball.x = place.x + bow_m_ * Bump(swing) * outward.x;
-    ball.z = place.z + bow_m_ * Bump(swing) * outward.z;
+    const DVec3 place = feet_.start_m + SmootherStep(swing) * (end - feet_.start_m);
+    const DVec3 outward = RotateYaw(0.5 * feet_.turn_rad, DVec3(SideSign(moving_), 0.0, 0.0));
+    ball.x = place.x + detour_m_ * Bump(swing) * outward.x;
+    ball.z = place.z + detour_m_ * Bump(swing) * outward.z;
     ball.y += lift_m_ * Bump(swing);
     return ball;
   }
@@ -245,7 +213,7 @@ class StepGenerator {
   // Yaw of a foot relative to the heading at the start of the step.
   [[nodiscard]] double FootYawAt(Foot foot, double time_s) const {
     if (foot == fixed_) return 0.0;
-    return feet_.turn_rad * Smooth((SwingAt(GenericAt(time_s)) - 0.08) / 0.84);
+    return feet_.turn_rad * SmootherStep((SwingAt(GenericAt(time_s)) - 0.08) / 0.84);
   }
   [[nodiscard]] DQuat AnkleRotationAt(Foot foot, double time_s) const {
     const double share = foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s);
@@ -311,12 +279,13 @@ class StepGenerator {
     return target;
   }
 
-  // Distance of the swinging foot from the fixed one, seen from above, between heel and toe tip.
+  // Returns the distance between the swinging and the fixed foot, from heel to toe tip, seen from
+  // above.
   [[nodiscard]] double FeetApart(double time_s) const {
     const Pose posture = PostureAt(time_s);
     const LegTarget swinging = TargetAt(moving_, time_s, posture);
     const LegTarget still = TargetAt(fixed_, time_s, posture);
-    double nearest = kMaxBowM;
+    double nearest = kDetours.max_m;
     for (int i = 0; i <= 4; ++i) {
       for (int k = 0; k <= 4; ++k) {
         const DVec3 a = swinging.heel_m + 0.25 * i * (swinging.tip_m - swinging.heel_m);
@@ -332,7 +301,7 @@ class StepGenerator {
   }
 
   [[nodiscard]] double NearestApproach() const {
-    double nearest = kMaxBowM;
+    double nearest = kDetours.max_m;
     for (int i = 1; i < 10; ++i) nearest = std::min(nearest, FeetApart(SwingTime(0.1 * i)));
     return nearest;
   }
@@ -341,16 +310,10 @@ class StepGenerator {
   // of the ground.
   void PlanSwing() {
     if (feet_.turn_rad != 0.0) {
-      double best_m = 0.0;
-      double widest_m = 0.0;
-      for (bow_m_ = 0.0; bow_m_ < kMaxBowM; bow_m_ += kBowStepM) {
-        const double nearest_m = NearestApproach();
-        if (nearest_m <= widest_m + 1e-3) continue;
-        widest_m = nearest_m;
-        best_m = bow_m_;
-        if (widest_m >= kFootWidthM) break;
-      }
-      bow_m_ = best_m;
+      detour_m_ = builtin::FindDetour(kDetours, [&](double detour_m) {
+        detour_m_ = detour_m;
+        return NearestApproach();
+      });
     }
     const LegRig::Side& side = person_.rig.side(moving_);
     const double ball_y = person_.stand.balls_m[Index(moving_)].y;
@@ -367,25 +330,22 @@ class StepGenerator {
     while (!is_clear() && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
   }
 
-  // Distance by which the root has to be lowered, so that the legs reach the feet.
-  [[nodiscard]] double Excess(double time_s) const {
+  // Returns by how much the root is too high for the legs.
+  [[nodiscard]] double MissingReach(double time_s) const {
     const Pose posture = PostureAt(time_s);
     const DVec3 root = RootAt(time_s);
-    double excess = -HUGE_VAL;
+    double missing = 0.0;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const LegTarget target = TargetAt(foot, time_s, posture);
       const LegRig::Side& side = person_.rig.side(foot);
       const DVec3 hip = root + DVec3(target.leg.positions_m[static_cast<std::size_t>(side.hip)]);
       const double reach = ExtensionOf(foot) * (side.thigh_m + side.shank_m);
-      const double dx = hip.x - target.ankle_m.x;
-      const double dz = hip.z - target.ankle_m.z;
-      const double ceiling =
-          target.ankle_m.y + std::sqrt(std::max(0.0, reach * reach - dx * dx - dz * dz));
-      excess = std::max(excess, hip.y - ceiling);
+      missing = std::max(missing, hip.y - builtin::HighestHipM(hip, target.ankle_m, reach));
     }
-    return std::max(0.0, excess);
+    return missing;
   }
 
+  // Returns the longest that a leg may be, as a fraction of its full length.
   [[nodiscard]] double ExtensionOf(Foot foot) const {
     LegPose leg;
     EvaluateLeg(person_.skeleton, person_.rig, ToPose(person_.stand), foot, leg);
@@ -396,41 +356,31 @@ class StepGenerator {
     return std::max(kMaxExtension, standing);
   }
 
-  // Returns how far the root is lowered at each frame: smoothly, and at both ends exactly as far as
-  // the state requires.
+  // Returns how far the root is lowered at each frame, so that the legs reach the feet. At both
+  // ends it depends only on the state, so that steps join.
   [[nodiscard]] std::vector<double> Lowering(int frames) const {
+    constexpr int kRounds = 3;
+    constexpr int kHalf = 10;
+    constexpr double kFramesFromEnds = 8.0;
+    std::vector<double> weights;
+    for (int k = -kHalf; k <= kHalf; ++k) weights.push_back(1.0 - std::fabs(k) / (kHalf + 1.0));
     const auto count = static_cast<std::size_t>(frames);
     std::vector<double> lowered(count, 0.0);
-    const double first = Excess(0.0);
-    const double last = Excess(end_s_);
+    const double first = MissingReach(0.0);
+    const double last = MissingReach(end_s_);
     for (std::size_t i = 0; i < count; ++i) {
       const double part = static_cast<double>(i) / static_cast<double>(count - 1);
-      lowered[i] = first + (last - first) * Smooth(part);
+      lowered[i] = first + (last - first) * SmootherStep(part);
     }
-    std::vector<double> highest(count);
-    for (int round = 0; round < 3; ++round) {
-      std::vector<double> excess(count);
+    std::vector<double> missing(count);
+    for (int round = 0; round < kRounds; ++round) {
       for (std::size_t i = 0; i < count; ++i) {
-        excess[i] = std::max(0.0, Excess(static_cast<double>(i) / kFps) - lowered[i]);
+        missing[i] = std::max(0.0, MissingReach(static_cast<double>(i) / kFps) - lowered[i]);
       }
-      const auto at = [&](const std::vector<double>& values, int i) {
-        return values[static_cast<std::size_t>(std::clamp(i, 0, frames - 1))];
-      };
-      for (int i = 0; i < frames; ++i) {
-        double most = 0.0;
-        for (int k = -kReachHalf; k <= kReachHalf; ++k) most = std::max(most, at(excess, i + k));
-        highest[static_cast<std::size_t>(i)] = most;
-      }
-      for (int i = 0; i < frames; ++i) {
-        double sum = 0.0;
-        double weights = 0.0;
-        for (int k = -kReachHalf; k <= kReachHalf; ++k) {
-          const double weight = 1.0 - std::fabs(k) / (kReachHalf + 1.0);
-          sum += weight * at(highest, i + k);
-          weights += weight;
-        }
-        const double to_end = std::min(i, frames - 1 - i);
-        lowered[static_cast<std::size_t>(i)] += sum / weights * Ease(to_end / 8.0);
+      const std::vector<double> smooth = MovingMean(MovingMaximum(missing, kHalf), weights);
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto to_end = static_cast<double>(std::min(i, count - 1 - i));
+        lowered[i] += smooth[i] * SmoothStep(to_end / kFramesFromEnds);
       }
     }
     return lowered;
@@ -459,9 +409,9 @@ class StepGenerator {
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;
   double end_s_ = 0.0;
-  Cubic captured_;
-  Cubic root_;
-  double bow_m_ = 0.0;
+  HermiteCurve captured_;  // Has the ends of the captured root.
+  HermiteCurve root_;      // Has the ends of the generated root.
+  double detour_m_ = 0.0;
   double lift_m_ = 0.0;
 };
 
@@ -478,25 +428,11 @@ RawExample MakeStep(const Person& person, Foot moving, const StepFeet& feet,
 
 RawExample MakeBackwardStep(const Person& person, Foot moving, const StepFeet& feet,
                             std::span<const ParameterName> names, std::string source) {
-  StepGenerator generator(person, moving, {feet.end_m, feet.start_m, 0.0});
-  const RawExample forward = generator.Run(names, std::move(source));
-  RawExample backward = forward;
-  const double end_s = kBackwardSlower * forward.keytimes_s.back();
-  const std::size_t keys = forward.keytimes_s.size();
-  for (std::size_t k = 0; k < keys; ++k) {
-    backward.keytimes_s[k] = end_s - kBackwardSlower * forward.keytimes_s[keys - 1 - k];
-  }
-  backward.clip.fps = forward.clip.fps / kBackwardSlower;
-  const int last = forward.clip.frame_count() - 1;
-  const Vec3 start = forward.clip.frame(last).root_position_m;
-  for (int f = 0; f <= last; ++f) {
-    const ConstPoseSpan from = forward.clip.frame(last - f);
-    PoseSpan to = backward.clip.frame(f);
-    to.root_position_m = from.root_position_m - Vec3(start.x, 0.0f, start.z);
-    std::ranges::copy(from.rotations, to.rotations.begin());
-  }
-  generator.SetParameters(names, backward);
-  return backward;
+  const StepFeet reversed = {feet.end_m, feet.start_m, 0.0};
+  RawExample step = builtin::Reversed(MakeStep(person, moving, reversed, names, std::move(source)),
+                                      kBackwardSlowdown);
+  MeasureStepParameters(person.skeleton, names, moving, step);
+  return step;
 }
 
 }  // namespace stridewire::complete

@@ -3,15 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/easing.h"
 #include "offline/base/statistics.h"
-#include "offline/builtin/elementary.h"
 #include "offline/extract/mirror.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire::complete {
 namespace {
-
-using builtin::Ease;
 
 // Limits of the strides that are averaged: level, straight ahead, from stride to stride.
 constexpr double kMinLengthM = 0.25;
@@ -58,7 +56,7 @@ double Lift(const Skeleton& skeleton, const RawExample& example, Foot moving) {
 
 bool IsStraightStride(const Stride& stride, Foot moving) {
   const auto is_beside = [&](const DVec3& d) {
-    return Outward(moving) * d.x > 0.0 && Outward(moving) * d.x < kMaxWidthM &&
+    return SideSign(moving) * d.x > 0.0 && SideSign(moving) * d.x < kMaxWidthM &&
            std::fabs(d.y) < kMaxRiseM;
   };
   return stride.example->keytimes_s.size() == kIntervals + 1 && -stride.start_m.z > kMinLengthM &&
@@ -132,9 +130,9 @@ StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides
     count += 1.0;
     for (std::size_t p = 0; p < model.points.size(); ++p) {
       SampleClip(clip, TimeAtPoint(example.keytimes_s, p), pose);
-      PostureSample sample =
-          SampleOf(skeleton, pose,
-                   Ease(static_cast<double>(p) / (kPointCount - 1)) * example.heading_change_rad);
+      PostureSample sample = SampleOf(
+          skeleton, pose,
+          SmoothStep(static_cast<double>(p) / (kPointCount - 1)) * example.heading_change_rad);
       DVec3 origin = sample.balls_m[fixed];
       origin.y = 0.0;
       sample.root_m -= origin;
@@ -146,7 +144,7 @@ StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides
     }
     model.start_length_m -= stride.start_m.z;
     model.end_length_m += stride.end_m.z;
-    model.width_m += 0.5 * Outward(moving) * (stride.start_m.x + stride.end_m.x);
+    model.width_m += 0.5 * SideSign(moving) * (stride.start_m.x + stride.end_m.x);
   }
   for (double& keytime : model.keytimes_s) keytime /= count;
   model.start_length_m /= count;
@@ -229,9 +227,9 @@ void JoinStrides(std::array<StrideModel, 2>& strides) {
     };
     constexpr int kHalf = kPointCount / 2;
     for (int i = 0; i < kHalf; ++i) {
-      const double weight = 1.0 - Ease(static_cast<double>(i) / kHalf);
+      const double weight = 1.0 - SmoothStep(static_cast<double>(i) / kHalf);
       // Feet are corrected in double support only, so that a standing foot stays flat.
-      const double foot_weight = 1.0 - Ease(static_cast<double>(i) / kPointsPerInterval);
+      const double foot_weight = 1.0 - SmoothStep(static_cast<double>(i) / kPointsPerInterval);
       correct(end, start, weight, foot_weight,
               before.points[static_cast<std::size_t>(kPointCount - 1 - i)]);
       correct(start, end, weight, foot_weight, after.points[static_cast<std::size_t>(i)]);

@@ -17,6 +17,7 @@
 #include "offline/extract/stand_pose.h"
 #include "offline/extract/still_ends.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "runtime/weights/end_measures.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {
@@ -259,7 +260,7 @@ class Extractor {
       if (std::fabs(direction - heading) > options_.straight_drift_max_rad) return false;
       heading = direction;
     }
-    const double own_side = step.moving == Foot::kLeft ? 1.0 : -1.0;
+    const double own_side = SideSign(step.moving);
     for (const int frame : {step.start, step.end}) {
       const double side = own_side * FootVectorAt(step.moving, frame, heading).x;
       if (side < -0.05 || side > options_.straight_side_max_m) return false;
@@ -344,29 +345,15 @@ class Extractor {
 
 }  // namespace
 
-void MeasureFootVectors(const Skeleton& skeleton, std::span<const ParameterName> names,
-                        ExtractedExample& step) {
-  if (!IsStep(step.kind)) return;
-  STRIDEWIRE_CHECK(names.size() == step.example.parameters.size());
-  const Clip& clip = step.example.clip;
-  const Foot moving = MovingFoot(step.kind);
-  const DVec3 start = FootVector(skeleton, clip.frame(0), moving, 0.0);
-  const DVec3 end = FootVector(skeleton, clip.frame(clip.frame_count() - 1), moving,
-                               step.example.heading_change_rad);
-  for (std::size_t i = 0; i < names.size(); ++i) {
-    double& value = step.example.parameters[i];
-    switch (names[i]) {
-      case ParameterName::kStartX: value = start.x; break;
-      case ParameterName::kStartY: value = start.y; break;
-      case ParameterName::kStartZ: value = start.z; break;
-      case ParameterName::kEndX: value = end.x; break;
-      case ParameterName::kEndY: value = end.y; break;
-      case ParameterName::kEndZ: value = end.z; break;
-      case ParameterName::kTurn:
-      case ParameterName::kLength:
-      case ParameterName::kHeight: break;
-    }
-  }
+void MeasureStepParameters(const Skeleton& skeleton, std::span<const ParameterName> names,
+                           Foot moving, RawExample& step) {
+  const Clip& clip = step.clip;
+  const EndMeasures ends = {.start_m = FootVector(skeleton, clip.frame(0), moving, 0.0),
+                            .end_m = FootVector(skeleton, clip.frame(clip.frame_count() - 1),
+                                                moving, step.heading_change_rad),
+                            .heading_change_rad = step.heading_change_rad};
+  step.parameters.clear();
+  for (const ParameterName name : names) step.parameters.push_back(ParameterOf(ends, name));
 }
 
 Extraction Extract(const Capture& capture, const ExtractOptions& options) {

@@ -100,10 +100,9 @@ inline constexpr ParameterName kStraightStepParameters[] = {ParameterName::kStar
 inline constexpr ParameterName kJumpParameters[] = {ParameterName::kLength, ParameterName::kHeight,
                                                     ParameterName::kTurn};
 
-/// Measures the parameters of a step that are foot vectors, again, in the first and last frame of
-/// its clip. `names` are the names of its parameters. Does nothing for jumps.
-void MeasureFootVectors(const Skeleton& skeleton, std::span<const ParameterName> names,
-                        ExtractedExample& step);
+/// Measures the parameters `names` of a step in the first and last frame of its clip.
+void MeasureStepParameters(const Skeleton& skeleton, std::span<const ParameterName> names,
+                           Foot moving, RawExample& step);
 
 /// Finds the steps and standing jumps of a capture and cuts them out as normalised examples.
 ///

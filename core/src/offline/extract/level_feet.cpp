@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "base/easing.h"
 
 namespace stridewire {
 namespace {
@@ -11,10 +12,9 @@ namespace {
 // A foot of a stand pose that is farther from the ground than this does not stand on it.
 constexpr double kMaxStandErrorM = 0.04;
 
-// Returns a smooth step from 0 at `from` to 1 at `to`.
-double Ramp(double t, double from, double to) {
-  const double s = std::clamp((t - from) / std::max(to - from, 1e-6), 0.0, 1.0);
-  return s * s * (3.0 - 2.0 * s);
+// Increases smoothly from 0 at the time `from_s` to 1 at `to_s`.
+double Ramp(double time_s, double from_s, double to_s) {
+  return SmoothStep((time_s - from_s) / std::max(to_s - from_s, 1e-6));
 }
 
 // The times between which the moving feet are in the air, in seconds.
@@ -64,7 +64,9 @@ void FeetLeveller::Level(ExtractedExample& example, std::span<const ParameterNam
     }
     Raise(raise_m, root_m, clip.frame(i));
   }
-  MeasureFootVectors(skeleton_, names, example);
+  if (is_step) {
+    MeasureStepParameters(skeleton_, names, MovingFoot(example.kind), example.example);
+  }
 }
 
 void FeetLeveller::Level(PoseSpan stand) const {

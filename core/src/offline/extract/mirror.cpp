@@ -256,7 +256,7 @@ ExtractedExample MirrorExample(const Skeleton& skeleton, const SkeletonMirror& m
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (names[i] == ParameterName::kTurn) out.example.parameters[i] *= -1.0;
   }
-  MeasureFootVectors(skeleton, names, out);
+  if (IsStep(out.kind)) MeasureStepParameters(skeleton, names, MovingFoot(out.kind), out.example);
   return out;
 }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "offline/inspect/degrees.h"
+#include "offline/base/degrees.h"
 #include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "offline/base/degrees.h"
 #include "offline/base/text.h"
-#include "offline/inspect/degrees.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include "offline/base/degrees.h"
 #include "offline/base/text.h"
-#include "offline/inspect/degrees.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/runtime/movement_request.h"
 

@@ -40,7 +40,7 @@ void AddGroup(const MotionGroup& group, StepRanges& ranges) {
                          group.FindParameter(ParameterName::kEndY)};
   const int x = end_x >= 0 ? end_x : start_x;
   const Foot foot = MovingFoot(group.kind);
-  const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+  const double outward = SideSign(foot);
   double& shortest_m = ranges.shortest_m[static_cast<std::size_t>(foot)];
   for (int s = 0; s < group.example_count; ++s) {
     const auto site = group.site(s);

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <span>
 
+#include "base/easing.h"
 #include "base/trig.h"
 #include "runtime/skeleton/layer_clip.h"
 #include "stridewire/runtime/pose.h"
@@ -44,8 +45,8 @@ constexpr double kHeadYawRad = 3.0 * kRadPerDegree;
 constexpr double kHeadPitchRad = 1.0 * kRadPerDegree;
 constexpr double kArmRad = 0.8 * kRadPerDegree;
 
-// Legs are not stretched further than in the stand pose or to this part of their length, whichever
-// is longer.
+// The distance from hip to ankle is at most that of the stand pose, or this part of the length of
+// the leg if that is longer.
 constexpr double kExtension = 0.995;
 
 // A sum of sines that all repeat after kIdleLoopS.
@@ -80,21 +81,19 @@ class Harmonics {
   double scale_ = 1.0;
 };
 
-// Part of the weight on the left foot (1) or the right foot (-1), from the given time on until the
-// next shift.
+// From `at_s` on, the weight shifts to `weight`: 1 if the left foot carries all of it, -1 if the
+// right foot does.
 struct WeightShift {
-  double at_s, to;
+  double at_s, weight;
 };
 constexpr std::array<WeightShift, 5> kWeightShifts{
     {{4.0, -0.7}, {13.0, 0.2}, {18.0, 1.0}, {27.0, -0.3}, {33.0, 0.6}}};
-constexpr double kShiftTakesS = 1.8;
+constexpr double kShiftDurationS = 1.8;
 
 double WeightAt(double time_s) {
-  double weight = kWeightShifts.back().to;
+  double weight = kWeightShifts.back().weight;
   for (const WeightShift& shift : kWeightShifts) {
-    const double s = std::clamp((time_s - shift.at_s) / kShiftTakesS, 0.0, 1.0);
-    // Smoothest step with continuous acceleration.
-    weight += (shift.to - weight) * (s * s * s * (10.0 + s * (6.0 * s - 15.0)));
+    weight += (shift.weight - weight) * SmootherStep((time_s - shift.at_s) / kShiftDurationS);
   }
   return weight;
 }
@@ -197,16 +196,17 @@ class IdleGenerator {
     shift_m_ = std::min(kShiftPart * apart_m, kMaxShiftM);
   }
 
-  // Sets the amount by which the pelvis is lower than in the stand pose all the time, so that both
-  // legs always reach the ground. If it were lowered only when a leg is too short, it would jerk.
-  void Lower(int points, double point_s) {
+  // Chooses how much lower the pelvis is than in the stand pose, so that both legs reach the ground
+  // in the whole loop. The pelvis would jerk if it were lowered only where a leg is too short.
+  // `point_s` is the time between two points of the loop.
+  void ChooseDrop(int points, double point_s) {
     drop_m_ = 0.0;
-    double most_m = 0.0;
+    double largest_m = 0.0;
     for (int p = 0; p < points; ++p) {
       PoseBody(p * point_s);
-      most_m = std::max(most_m, MissingReach());
+      largest_m = std::max(largest_m, MissingReach());
     }
-    drop_m_ = most_m;
+    drop_m_ = largest_m;
   }
 
   const Pose& At(double time_s) {
@@ -344,22 +344,22 @@ StandMotion::StandMotion(const Skeleton& skeleton, const LegRig& rig, const Pose
     : settle(MakeGroup(kSettleCellCounts, kSettleKeytimesS, kSettleEaseS)),
       idle(MakeGroup(kIdleCellCounts, kIdleKeytimesS, kIdleEaseS)) {
   const GridLayout layout(skeleton.joint_count());
-  const auto row_parts = static_cast<std::size_t>(layout.row_floats) / std::size(RowPart().of);
+  const auto row_parts = static_cast<std::size_t>(layout.row_floats) / std::size(RowPart().floats);
   const auto allocate = [&](std::vector<RowPart>& grid, MotionGroup& group) {
     grid.resize(static_cast<std::size_t>(group.grid_point_count) * row_parts);
-    group.grid = {grid.front().of, grid.size() * std::size(RowPart().of)};
+    group.grid = {grid.front().floats, grid.size() * std::size(RowPart().floats)};
   };
   allocate(settle_grid_, settle);
   allocate(idle_grid_, idle);
   const auto row = [&](std::vector<RowPart>& grid, int point) {
-    return grid[static_cast<std::size_t>(point) * row_parts].of;
+    return grid[static_cast<std::size_t>(point) * row_parts].floats;
   };
   for (int p = 0; p < settle.grid_point_count; ++p) {
     SetRow(layout, stand_pose, row(settle_grid_, p));
   }
   IdleGenerator generator(skeleton, rig, stand_pose);
   constexpr double kPointS = 1.0 / kIdleCellsPerS;
-  generator.Lower(idle.grid_point_count, kPointS);
+  generator.ChooseDrop(idle.grid_point_count, kPointS);
   for (int p = 0; p < idle.grid_point_count; ++p) {
     SetRow(layout, generator.At(p * kPointS), row(idle_grid_, p));
   }

@@ -31,7 +31,7 @@ struct StandMotion {
  private:
   // A part of a grid row, aligned as the kernels require.
   struct alignas(64) RowPart {
-    float of[16] = {};
+    float floats[16] = {};
   };
   std::vector<RowPart> settle_grid_;
   std::vector<RowPart> idle_grid_;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "base/easing.h"
 #include "runtime/skeleton/layer_clip.h"
 #include "stridewire/runtime/motion_library.h"
 
@@ -12,16 +13,13 @@ namespace {
 
 bool IsWithin(double value, double low, double high) { return value >= low && value <= high; }
 
-// Eases from 0 to 1 with zero slope at both ends.
-double Ease(double u) { return u >= 1.0 ? 1.0 : u * u * (3.0 - 2.0 * u); }
-
 // Returns the elapsed fraction of the current blend.
 double Progress(const LayerStack::Playing& p) {
   return p.elapsed_s >= p.ease_s ? 1.0 : p.elapsed_s / p.ease_s;
 }
 
 double WeightOf(const LayerStack::Playing& p) {
-  const double weight = p.from_weight + (p.to_weight - p.from_weight) * Ease(Progress(p));
+  const double weight = p.from_weight + (p.to_weight - p.from_weight) * SmoothStep(Progress(p));
   if (p.elapsed_s >= p.slope_s) return std::clamp(weight, 0.0, 1.0);
   // t (1 - t / T)^2 has slope 1 at t = 0 and value and slope 0 at t = T. It lets the weight start
   // with the slope that it had before.
@@ -105,7 +103,7 @@ void LayerStack::Advance(const MotionLibrary& library, double dt_s) {
   STRIDEWIRE_CHECK(playing_.size() <= kMaxLayers);
   for (Playing& p : playing_) {
     p.elapsed_s += dt_s;
-    p.speed = p.from_speed + (p.to_speed - p.from_speed) * Ease(Progress(p));
+    p.speed = p.from_speed + (p.to_speed - p.from_speed) * SmoothStep(Progress(p));
     p.time_s += dt_s * p.speed;
     const LayerClip& clip = library.layers()[static_cast<std::size_t>(p.layer)];
     const double duration_s = clip.duration_s();

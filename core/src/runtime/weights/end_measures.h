@@ -8,13 +8,29 @@ namespace stridewire {
 /// Measurements of a movement's first and last pose. Feet are measured at their balls.
 struct EndMeasures {
   /// Vector from the fixed foot to the moving foot in the first pose, in its heading frame.
-  DVec3 start_m;
+  DVec3 start_m = DVec3(0.0);
   /// Vector from the fixed foot to the moving foot in the last pose, in its heading frame.
-  DVec3 end_m;
+  DVec3 end_m = DVec3(0.0);
   /// Displacement of the centre between the balls, in the heading frame of the first pose.
-  DVec3 travel_m;
-  double heading_change_rad;
+  DVec3 travel_m = DVec3(0.0);
+  double heading_change_rad = 0.0;
 };
+
+/// Returns one parameter of a movement with these ends.
+[[nodiscard]] inline double ParameterOf(const EndMeasures& ends, ParameterName name) {
+  switch (name) {
+    case ParameterName::kStartX: return ends.start_m.x;
+    case ParameterName::kStartY: return ends.start_m.y;
+    case ParameterName::kStartZ: return ends.start_m.z;
+    case ParameterName::kEndX: return ends.end_m.x;
+    case ParameterName::kEndY: return ends.end_m.y;
+    case ParameterName::kEndZ: return ends.end_m.z;
+    case ParameterName::kTurn: return ends.heading_change_rad;
+    case ParameterName::kLength: return ends.travel_m.z;
+    case ParameterName::kHeight: return ends.travel_m.y;
+  }
+  return 0.0;
+}
 
 /// Converts the measurements to the parameters of a group.
 [[nodiscard]] inline ParameterValues ParametersOf(const MotionGroup& group,
@@ -22,18 +38,7 @@ struct EndMeasures {
   ParameterValues measured;
   measured.count = group.parameter_count();
   for (std::size_t l = 0; l < group.parameters.size(); ++l) {
-    double& value = measured.values[l];
-    switch (group.parameters[l].name) {
-      case ParameterName::kStartX: value = ends.start_m.x; break;
-      case ParameterName::kStartY: value = ends.start_m.y; break;
-      case ParameterName::kStartZ: value = ends.start_m.z; break;
-      case ParameterName::kEndX: value = ends.end_m.x; break;
-      case ParameterName::kEndY: value = ends.end_m.y; break;
-      case ParameterName::kEndZ: value = ends.end_m.z; break;
-      case ParameterName::kTurn: value = ends.heading_change_rad; break;
-      case ParameterName::kLength: value = ends.travel_m.z; break;
-      case ParameterName::kHeight: value = ends.travel_m.y; break;
-    }
+    measured.values[l] = ParameterOf(ends, group.parameters[l].name);
   }
   return measured;
 }
