@@ -46,7 +46,7 @@ struct FootTrajectory {
   /// Additional heights early, in the middle and late in the swing, to clear the ground. Each is
   /// the peak of a curve that fades in and out (LiftShare).
   std::array<double, 3> lift_m{};
-  /// Sideways offset in the middle of the swing, to pass the other foot.
+  /// Horizontal offset in the middle of the swing, to pass the other foot and the edges of treads.
   DVec3 aside_m = DVec3(0.0);
   /// Share of the foot's correction by which the root moves; the shares of both feet sum to 1.
   double root_weight = 0.0;

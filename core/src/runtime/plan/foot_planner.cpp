@@ -37,6 +37,15 @@ constexpr std::array<double, 20> kClearanceSamples{0.09, 0.13, 0.16, 0.19, 0.22,
                                                    0.32, 0.37, 0.43, 0.49, 0.55, 0.61, 0.66,
                                                    0.71, 0.76, 0.8,  0.84, 0.88, 0.91};
 
+// A foot that is lifted by more than kNoticeableLiftM may be ahead of its path or behind it by up
+// to kMaxAdvanceM. Swings are compared by their peaks, by their steepness in metres per swing times
+// kSteepnessWeight, and by the advance times kAdvanceCost.
+constexpr double kNoticeableLiftM = 0.01;
+constexpr double kMaxAdvanceM = 0.12;
+constexpr double kSteepnessWeight = 0.1;
+constexpr double kAdvanceCost = 0.2;
+constexpr std::array<double, 8> kAdvances{-0.25, 0.25, -0.5, 0.5, -0.75, 0.75, -1.0, 1.0};
+
 // Fractions of the swing at which the reach of the legs is checked.
 constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
 constexpr double kMaxRootSinkM = 0.3;
@@ -116,30 +125,64 @@ double Levelling(double above_m) {
 
 constexpr std::size_t kMiddleLift = 1;
 
-// Returns lifts whose sum is at least `lacks_m` at each sample of the swing, as far as kMaxLiftM
-// allows. The greatest lack is met first, by the lift that has the largest share at that moment.
-std::array<double, 3> LiftsFor(std::array<double, kClearanceSamples.size()> lacks_m) {
-  constexpr double kNegligibleM = 1e-4;
-  std::array<double, 3> lifts_m{};
-  for (std::size_t round = 0; round < kClearanceSamples.size(); ++round) {
-    const auto worst =
-        static_cast<std::size_t>(std::ranges::max_element(lacks_m) - lacks_m.begin());
-    if (lacks_m[worst] < kNegligibleM) break;
-    std::size_t best = kMiddleLift;
-    for (const std::size_t lift : {0, 2}) {
-      if (LiftShare(lift, kClearanceSamples[worst]) > LiftShare(best, kClearanceSamples[worst])) {
-        best = lift;
+// A value at each of kClearanceSamples.
+using SwingValues = std::array<double, kClearanceSamples.size()>;
+
+struct SwingLifts {
+  std::array<double, 3> lift_m{};  // FootTrajectory::lift_m
+  double cost_m = HUGE_VAL;
+};
+
+// Returns what a swing with these heights costs: its peak above both footprints and its steepest
+// part, from one footprint to the other.
+double SwingCost(const SwingValues& heights_m, double from_m, double to_m) {
+  double peak_m = std::max(from_m, to_m);
+  double steepest_m = 0.0;
+  double before_m = from_m;
+  double before = 0.0;
+  for (std::size_t s = 0; s <= kClearanceSamples.size(); ++s) {
+    const bool is_last = s == kClearanceSamples.size();
+    const double height_m = is_last ? to_m : heights_m[s];
+    const double part = is_last ? 1.0 : kClearanceSamples[s];
+    peak_m = std::max(peak_m, height_m);
+    steepest_m = std::max(steepest_m, std::fabs(height_m - before_m) / (part - before));
+    before_m = height_m;
+    before = part;
+  }
+  return peak_m - std::max(from_m, to_m) + kSteepnessWeight * steepest_m;
+}
+
+// Returns the lifts with the lowest cost whose sum is at least `lacks_m` at each sample of the
+// swing, as far as kMaxLiftM allows. `heights_m` are the heights of the foot without lifts.
+SwingLifts LowestLifts(const SwingValues& lacks_m, const SwingValues& heights_m, double from_m,
+                       double to_m) {
+  constexpr int kMiddleLifts = 16;
+  std::array<SwingValues, 3> shares;
+  for (std::size_t lift = 0; lift < shares.size(); ++lift) {
+    std::ranges::transform(kClearanceSamples, shares[lift].begin(),
+                           [lift](double part) { return LiftShare(lift, part); });
+  }
+  // For each lift in the middle, the smallest early and late lifts follow from the two halves.
+  const double most_m = std::min(1.5 * std::ranges::max(lacks_m), kMaxLiftM);
+  SwingLifts best;
+  for (int i = 0; i <= kMiddleLifts; ++i) {
+    SwingLifts lifts{.lift_m = {0.0, most_m * i / kMiddleLifts, 0.0}};
+    for (std::size_t s = 0; s < kClearanceSamples.size(); ++s) {
+      const std::size_t half = kClearanceSamples[s] < 0.5 ? 0 : 2;
+      const double lacks = lacks_m[s] - lifts.lift_m[kMiddleLift] * shares[kMiddleLift][s];
+      lifts.lift_m[half] =
+          std::max(lifts.lift_m[half], std::min(lacks / shares[half][s], kMaxLiftM));
+    }
+    SwingValues lifted_m = heights_m;
+    for (std::size_t s = 0; s < kClearanceSamples.size(); ++s) {
+      for (std::size_t lift = 0; lift < shares.size(); ++lift) {
+        lifted_m[s] += lifts.lift_m[lift] * shares[lift][s];
       }
     }
-    const double before_m = lifts_m[best];
-    const double share = LiftShare(best, kClearanceSamples[worst]);
-    lifts_m[best] = std::min(before_m + lacks_m[worst] / share, kMaxLiftM);
-    for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
-      lacks_m[i] -= (lifts_m[best] - before_m) * LiftShare(best, kClearanceSamples[i]);
-    }
-    if (lifts_m[best] >= kMaxLiftM) lacks_m[worst] = 0.0;
+    lifts.cost_m = SwingCost(lifted_m, from_m, to_m);
+    if (lifts.cost_m < best.cost_m) best = lifts;
   }
-  return lifts_m;
+  return best;
 }
 
 class Planner {
@@ -467,39 +510,84 @@ class Planner {
     trajectory.normals[1] = support.normal;
   }
 
-  // Returns the lifts (FootTrajectory::lift_m) that the swinging foot needs so that its sole clears
-  // the ground.
-  std::array<double, 3> LiftOver(Foot moving, const Terrain& terrain) {
+  // Raises the swinging foot so that its sole clears the ground. If it has to rise, it also moves
+  // later or earlier toward its footprint, to pass the edge of a tread at a better moment.
+  void ClearGround(Foot moving, const Terrain& terrain, FootTrajectory& trajectory) {
+    const SwingSoles soles = SampleSoles(moving);
+    const DVec3 way = trajectory.to.position_m - trajectory.from.position_m;
+    const double length_m = std::sqrt(way.x * way.x + way.z * way.z);
+    const auto lifts_with = [&](const DVec3& advance_m) {
+      return LiftsOver(soles, trajectory, advance_m, terrain);
+    };
+    SwingLifts best = lifts_with(DVec3(0.0));
+    if (std::ranges::max(best.lift_m) > kNoticeableLiftM && length_m > 2.0 * kMaxAdvanceM) {
+      const DVec3 forward(way.x / length_m, 0.0, way.z / length_m);
+      for (const double part : kAdvances) {
+        const DVec3 advance = part * kMaxAdvanceM * forward;
+        SwingLifts lifts = lifts_with(advance);
+        lifts.cost_m += kAdvanceCost * std::fabs(part) * kMaxAdvanceM;
+        if (lifts.cost_m >= best.cost_m) continue;
+        best = lifts;
+        trajectory.aside_m = advance;
+      }
+    }
+    trajectory.lift_m = best.lift_m;
+  }
+
+ private:
+  // The sole of a swinging foot without lifts, at kClearanceSamples.
+  struct SwingSoles {
+    // Ball, heel and toe tip, minus their heights above the ground at rest.
+    std::array<std::array<DVec3, 3>, kClearanceSamples.size()> points_m;
+    SwingValues balls_m;  // Heights of the ball above its height at rest.
+  };
+
+  SwingSoles SampleSoles(Foot moving) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const LegRig::Side& side = rig_.side(moving);
+    SwingSoles soles;
     LegPose leg;
-    std::array<double, kClearanceSamples.size()> lacks_m{};
     for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
-      const double part = kClearanceSamples[i];
       const double time_s =
-          trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
+          trajectory.release_s + kClearanceSamples[i] * (trajectory.land_s - trajectory.release_s);
       EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
       EvaluateLeg(skeleton_, rig_, pose_, moving, leg);
       const BlendedFoot blended = FootOf(rig_, moving, DVec3(pose_.root_position_m), leg);
       const FootCorrection correction = CorrectFoot(movement_, moving, time_s, blended);
       const DVec3 ball = blended.ball_m + correction.offset_m;
       const Quat turn = TurnOf(correction);
-      // Near its footprints, a foot may be close to a riser without touching it.
-      const double away = LiftShare(kMiddleLift, part);
-      const auto clear = [&](const Vec3& point, double rest_m) {
-        const DVec3 at = ball + DVec3(turn * (point - leg.ball_m));
-        const double radius_m = kPassingRadiusM * (0.25 + 0.75 * away);
-        const double ground_m = terrain.HighestWithin(at.x, at.z, radius_m);
-        lacks_m[i] = std::max(lacks_m[i], ground_m + kClearanceM * away - (at.y - rest_m));
+      const auto sole = [&](const Vec3& point, double rest_m) {
+        return ball + DVec3(turn * (point - leg.ball_m)) - DVec3(0.0, rest_m, 0.0);
       };
-      clear(leg.ball_m, side.ball_height_m);
-      clear(leg.heel_m, side.ball_height_m);
-      clear(leg.toe_tip_m, side.toe_height_m);
+      soles.points_m[i] = {sole(leg.ball_m, side.ball_height_m),
+                           sole(leg.heel_m, side.ball_height_m),
+                           sole(leg.toe_tip_m, side.toe_height_m)};
+      soles.balls_m[i] = soles.points_m[i][0].y;
     }
-    return LiftsFor(lacks_m);
+    return soles;
   }
 
- private:
+  // Returns the lifts that a foot needs to clear the ground if `aside_m` is added to its path
+  // (FootTrajectory::aside_m).
+  static SwingLifts LiftsOver(const SwingSoles& soles, const FootTrajectory& trajectory,
+                              const DVec3& aside_m, const Terrain& terrain) {
+    SwingValues lacks_m{};
+    for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
+      const double part = kClearanceSamples[i];
+      const double across = 4.0 * part * (1.0 - part);
+      // Near its footprints, a foot may be close to a riser without touching it.
+      const double away = LiftShare(kMiddleLift, part);
+      const double radius_m = kPassingRadiusM * (0.25 + 0.75 * away);
+      for (const DVec3& point : soles.points_m[i]) {
+        const DVec3 at = point + across * across * aside_m;
+        const double ground_m = terrain.HighestWithin(at.x, at.z, radius_m);
+        lacks_m[i] = std::max(lacks_m[i], ground_m + kClearanceM * away - at.y);
+      }
+    }
+    return LowestLifts(lacks_m, soles.balls_m, trajectory.from.position_m.y,
+                       trajectory.to.position_m.y);
+  }
+
   const MotionLibrary& library_;
   const Skeleton& skeleton_;
   const LegRig& rig_;
@@ -694,11 +782,13 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     }
     const double push_m = planner.PushAside(moving);
     double root_sink_m = 0.0;
-    if (target->terrain != nullptr) trajectory.lift_m = planner.LiftOver(moving, *target->terrain);
-    if (target->terrain != nullptr) root_sink_m = planner.RootSink(moving);
+    if (target->terrain != nullptr) {
+      planner.ClearGround(moving, *target->terrain, trajectory);
+      root_sink_m = planner.RootSink(moving);
+    }
     if (push_m > 0.0) {
-      trajectory.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
-                                     DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
+      trajectory.aside_m += RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
+                                      DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
     }
     if (target->request.root_m)
       trajectory.root_shift_m = planner.RootShift(*target->request.root_m);

@@ -27,6 +27,7 @@ struct CorrectionOf {
   Vector offset;
   Number swing;       // Elapsed fraction of the swing: 0 before release, 1 after landing.
   Number turned;      // Fraction of the change in heading and tilt that is complete.
+  Number tilted;      // Share of the ground's slope by which the foot tilts.
   Number turn;        // Turn that is added to the heading, in radians.
   Number free_turn;   // Turn that would be added if the heading were not locked.
   Vector root_shift;  // Part of FootTrajectory::root_shift_m that is complete.
@@ -91,6 +92,7 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   // The extra turn of the body does not rotate a standing foot. During its swing, the foot catches
   // up with the turn that the body will have made by the time it lands.
   c.turned = one - EaseOut(s);
+  c.tilted = one - Constant<Number>(1.0 - kSwingTilt) * (across * across);
   const auto& turn = trajectory.turn;
   Number free = turn[0] + settled * (turn[1] - turn[0]) + c.turned * (turn[2] - turn[1]);
   free = free + (ExtraTurnAt(timing, Min(trajectory.land_s, timing.duration_s)) * c.turned -

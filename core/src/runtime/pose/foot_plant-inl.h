@@ -186,8 +186,10 @@ HWY_INLINE SoaCorrection CorrectFoot(const PlanCommon& common, const SoaTrajecto
   const auto correction =
       CorrectTrajectory<Float, SoaVec3>(common, trajectory, ball, heading, flatness);
   const Float one = 1.0f;
-  const SoaVec3 tilt =
+  SoaVec3 tilt =
       trajectory.normals[0] * (one - correction.turned) + trajectory.normals[1] * correction.turned;
+  tilt.x = tilt.x * correction.tilted;
+  tilt.z = tilt.z * correction.tilted;
   const SoaVec3 normal = tilt * (one / Sqrt(Dot(tilt, tilt)));
   SoaCorrection c;
   c.offset = correction.offset;

@@ -114,8 +114,11 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
   const auto c =
       CorrectTrajectory<double, DVec3>(Timing(movement, time_s), TrajectoryFor(movement.feet, foot),
                                        blended.ball_m, blended.heading_rad, blended.flatness);
-  const auto tilted = static_cast<float>(c.turned);
-  const Vec3 normal = (1.0f - tilted) * trajectory.normals[0] + tilted * trajectory.normals[1];
+  const auto turned = static_cast<float>(c.turned);
+  const auto tilted = static_cast<float>(c.tilted);
+  Vec3 normal = (1.0f - turned) * trajectory.normals[0] + turned * trajectory.normals[1];
+  normal.x *= tilted;
+  normal.z *= tilted;
   return {.offset_m = c.offset,
           .turn_rad = c.turn,
           .free_turn_rad = c.free_turn,

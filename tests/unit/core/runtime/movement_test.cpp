@@ -9,6 +9,7 @@
 #include <random>
 
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 
@@ -147,6 +148,23 @@ TEST_F(MovementTest, BaseAfterIsBelowTheRootAndTurned) {
   EXPECT_FLOAT_EQ(static_cast<float>(after.position_m.x), end.root_position_m.x);
   EXPECT_EQ(after.position_m.y, 0.5);
   EXPECT_DOUBLE_EQ(after.heading_rad, 0.55);
+}
+
+TEST_F(MovementTest, SwingingFootTiltsLessThanTheGround) {
+  constexpr float kDegree = 0.0174533f;
+  const Vec3 slope(0.0f, std::cos(20.0f * kDegree), -std::sin(20.0f * kDegree));
+  Movement movement = Start(0, std::array{-0.4, 0.4});
+  FootTrajectory& trajectory = movement.feet.foot(Foot::kLeft);
+  trajectory.normals.fill(slope);
+  trajectory.release_s = 0.2 * movement.duration_s();
+  trajectory.land_s = 0.8 * movement.duration_s();
+  const auto tilt_deg = [&](double part) {
+    const Vec3 normal =
+        CorrectFoot(movement, Foot::kLeft, part * movement.duration_s(), BlendedFoot{}).normal;
+    return std::acos(normal.y) / kDegree;
+  };
+  for (const double standing : {0.0, 0.2, 0.8, 1.0}) EXPECT_NEAR(tilt_deg(standing), 20.0, 0.1);
+  EXPECT_LT(tilt_deg(0.5), 10.0);
 }
 
 }  // namespace
