@@ -42,9 +42,12 @@ constexpr double kSlack = 1.05;
 // A step that goes no further forward than this ends with the body above both feet.
 constexpr double kForwardM = 0.2;
 
-// Steps that go less far forward than this, or turn by more, are played fast.
+// Steps that go less far forward than this, or turn by more, are played fast, unless their foot
+// climbs or descends by more than kUnhurriedClimbM: people do not take stairs faster because their
+// treads are short.
 constexpr double kStrideM = 0.35;
 constexpr double kHurriedTurnRad = 0.25;
+constexpr double kUnhurriedClimbM = 0.08;
 
 // Limits on the ground below a sole (FootSupport). They exclude edges, bumps and walls.
 constexpr double kLeastCarried = 0.999;
@@ -72,6 +75,13 @@ constexpr double kExpectedStepS = 0.6;
 
 // Radii of the rings of eight alternative footprints around the desired one, closest first.
 constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
+
+// Steps that would climb or descend by more than kEasyClimbM are shortened to fractions of their
+// length, if that leads onto ground that is at least kLeastClimbM higher or lower than the standing
+// foot. People do not skip treads of stairs either.
+constexpr double kEasyClimbM = 0.18;
+constexpr double kLeastClimbM = 0.05;
+constexpr std::array<double, 6> kShorterSteps{0.9, 0.8, 0.7, 0.6, 0.5, 0.4};
 
 // Feet keep this distance from risers in front of their toes and behind their heels, if a shift of
 // the footprint makes that possible.
@@ -161,7 +171,7 @@ class StepPlanner {
     Footprint wanted{step.print.position_m,
                      UnwrapAngle(step.print.heading_rad, stance_.heading_rad)};
     if (terrain_ == nullptr) return PlanExactStep(Level(wanted), step);
-    if (!step.is_last) wanted = WithRoom(wanted);
+    if (!step.is_last) wanted = WithEasyClimb(WithRoom(wanted));
     if (!checks_ground_ || IsGood(wanted)) return PlanExactStep(OnGround(wanted), step);
     if (step.is_last) return std::nullopt;
     int out_of_reach = 0;
@@ -266,6 +276,27 @@ class StepPlanner {
     return print;
   }
 
+  // Returns the footprint, moved back toward the standing foot if the step would climb or descend
+  // too much.
+  Footprint WithEasyClimb(const Footprint& print) const {
+    const auto climb_m = [&](const Footprint& at) {
+      return terrain_->HeightAt(at.position_m.x, at.position_m.z) - fixed_m_.y;
+    };
+    const double full_m = climb_m(print);
+    if (std::fabs(full_m) <= kEasyClimbM) return print;
+    const double ahead_m = RotateYaw(-print.heading_rad, print.position_m - fixed_m_).z;
+    for (const double part : kShorterSteps) {
+      Footprint shorter = print;
+      shorter.position_m -= RotateYaw(print.heading_rad, DVec3(0.0, 0.0, (1.0 - part) * ahead_m));
+      shorter = WithRoom(shorter);
+      const double part_m = climb_m(shorter) * (full_m > 0.0 ? 1.0 : -1.0);
+      if (part_m >= kLeastClimbM && part_m <= kEasyClimbM && Carries(moving_, shorter)) {
+        return shorter;
+      }
+    }
+    return print;
+  }
+
   bool IsGood(const Footprint& print) {
     if (is_exhausted()) return false;
     ++candidates_;
@@ -325,7 +356,10 @@ class StepPlanner {
     }
     plan->max_extra_turn_rad = kMaxWalkTurnRad;
     // Short and turning steps are the slowest of most libraries, but people take them quickly.
-    if (wanted.z < kStrideM || std::fabs(wanted_rad) > kHurriedTurnRad) {
+    const double climb_m =
+        print.position_m.y - stance_.feet[static_cast<std::size_t>(moving_)].position_m.y;
+    if (std::fabs(climb_m) <= kUnhurriedClimbM &&
+        (wanted.z < kStrideM || std::fabs(wanted_rad) > kHurriedTurnRad)) {
       plan->max_rate = kHurriedRate;
     }
     plan->most_residual_m = reach * kMaxPlantedErrorM;

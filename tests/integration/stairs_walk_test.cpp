@@ -1,0 +1,183 @@
+// Walks to a place at the top of a flight of stairs and back down, with seeded rises and treads.
+// The test compares what people keep on stairs: how high a foot swings, how far knees bend and how
+// fast, and how abruptly the pelvis rises and falls.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "captured_library.h"
+#include "leg_geometry.h"
+#include "random.h"
+#include "stridewire/offline/synthesis.h"
+#include "stridewire/runtime/terrain.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kFps = 60.0;
+
+// Largest values that captures of people on blocks and stairs support.
+constexpr double kMostSwingM = 0.2;  // Above the higher one of the two footprints.
+constexpr double kMostKneeDeg = 120.0;
+constexpr double kMostKneeDegPerS = 800.0;
+constexpr double kMostAcceleration = 17.0;       // Of the pelvis, vertical, in m/s².
+constexpr double kMostUsualAcceleration = 10.0;  // The same in 99 % of all frames.
+constexpr std::size_t kAveragedFrames = 5;
+// People take one tread at a time, however low it is.
+constexpr double kMostClimbM = 0.18;
+
+struct Flight {
+  double rise_m;
+  double tread_m;
+  int treads;
+};
+
+std::shared_ptr<const Terrain> Build(const Flight& flight) {
+  constexpr double kLandingM = 3.0;
+  TerrainData data;
+  for (int i = 0; i < flight.treads; ++i) {
+    const double begin_m = 0.6 + i * flight.tread_m;
+    const bool is_last = i + 1 == flight.treads;
+    data.boxes.push_back({{-2.0, begin_m},
+                          {2.0, begin_m + (is_last ? kLandingM : flight.tread_m)},
+                          (i + 1) * flight.rise_m});
+  }
+  return Terrain::Make(std::move(data)).value();
+}
+
+Synthesis WalkUpAndDown(const std::shared_ptr<const MotionLibrary>& library, const Flight& flight) {
+  const double top_m = 0.6 + (flight.treads - 1) * flight.tread_m + 1.2;
+  const std::vector<MovementRequest> requests{
+      {1, WalkRequest{.position_m = {0.0, flight.treads * flight.rise_m, top_m}}},
+      {2, StandRequest{.seconds = 0.5}},
+      {3, WalkRequest{.position_m = {0.0, 0.0, -0.5}, .heading_rad = M_PI}}};
+  return Synthesize({.library = library,
+                     .requests = requests,
+                     .fps = kFps,
+                     .options = {.terrain = Build(flight)}})
+      .value();
+}
+
+struct Looks {
+  double swing_m = 0.0;
+  double knee_deg = 0.0;
+  double knee_deg_per_s = 0.0;
+  double acceleration = 0.0;
+  double usual_acceleration = 0.0;
+  double climb_m = 0.0;  // Largest height between footprints of successive steps.
+};
+
+// Measures the vertical acceleration of the pelvis, averaged over kAveragedFrames.
+void MeasurePelvis(const Clip& clip, Looks& looks) {
+  std::vector<double> heights_m;
+  for (std::size_t f = 0; f + kAveragedFrames <= clip.root_positions_m.size(); ++f) {
+    double sum_m = 0.0;
+    for (std::size_t k = 0; k < kAveragedFrames; ++k) sum_m += clip.root_positions_m[f + k].y;
+    heights_m.push_back(sum_m / static_cast<double>(kAveragedFrames));
+  }
+  std::vector<double> accelerations;
+  for (std::size_t f = 1; f + 1 < heights_m.size(); ++f) {
+    const double bend_m = heights_m[f - 1] - 2.0 * heights_m[f] + heights_m[f + 1];
+    accelerations.push_back(std::fabs(bend_m) * kFps * kFps);
+  }
+  std::ranges::sort(accelerations);
+  looks.acceleration = accelerations.back();
+  looks.usual_acceleration = accelerations[accelerations.size() * 99 / 100];
+}
+
+void MeasureLegs(const MotionLibrary& library, const Synthesis& synthesis, Looks& looks) {
+  LegGeometry legs(library.skeleton(), library.stand_pose());
+  const Clip& clip = synthesis.clip;
+  const auto frames = static_cast<std::size_t>(clip.frame_count());
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const double rest_m = legs.RestingHeights(foot)[1];
+    std::vector<double> balls_m;
+    std::vector<double> knees_deg;
+    for (std::size_t f = 0; f < frames; ++f) {
+      legs.Set(clip.frame(static_cast<int>(f)));
+      balls_m.push_back(legs.Sole(foot)[1].y - rest_m);
+      knees_deg.push_back(legs.KneeDegrees(foot));
+    }
+    looks.knee_deg = std::max(looks.knee_deg, std::ranges::max(knees_deg));
+    for (std::size_t f = 1; f + 1 < frames; ++f) {
+      const double speed = std::fabs(knees_deg[f + 1] - knees_deg[f - 1]) * 0.5 * kFps;
+      looks.knee_deg_per_s = std::max(looks.knee_deg_per_s, speed);
+    }
+    // The swings of a foot are between its plants.
+    std::map<double, PlantRecord> plants;
+    for (const MovementRecord& movement : synthesis.movements) {
+      for (const PlantRecord& plant : movement.plants) {
+        if (plant.foot == foot) plants.emplace(plant.from_s, plant);
+      }
+    }
+    for (auto next = plants.begin(); next != plants.end(); ++next) {
+      if (next == plants.begin()) continue;
+      const PlantRecord& from = std::prev(next)->second;
+      const double ends_m = std::max(from.anchor_m.y, next->second.anchor_m.y);
+      const auto last = std::min(static_cast<std::size_t>(next->second.from_s * kFps), frames - 1);
+      for (auto f = static_cast<std::size_t>(from.to_s * kFps); f <= last; ++f) {
+        looks.swing_m = std::max(looks.swing_m, balls_m[f] - ends_m);
+      }
+    }
+  }
+}
+
+double LargestClimb(const Synthesis& synthesis) {
+  double climb_m = 0.0;
+  double before_m = 0.0;
+  for (const MovementRecord& movement : synthesis.movements) {
+    if (movement.kind != MovementKind::kStepLeft && movement.kind != MovementKind::kStepRight) {
+      continue;
+    }
+    const double height_m = movement.plants.back().anchor_m.y;
+    climb_m = std::max(climb_m, std::fabs(height_m - before_m));
+    before_m = height_m;
+  }
+  return climb_m;
+}
+
+class StairsWalk : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, StairsWalk, testing::Values("", "16", "29"),
+                         [](const auto& subject) {
+                           const std::string name = subject.param;
+                           return name.empty() ? "Builtin" : "Subject" + name;
+                         });
+
+TEST_P(StairsWalk, KeepsWithinWhatPeopleDo) {
+  std::vector<std::string> subjects;
+  if (*GetParam() != '\0') subjects.emplace_back(GetParam());
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const auto library = LibraryOf(subjects);
+  constexpr unsigned kSeed = 5;
+  std::printf("seed %u\n", kSeed);
+  Random random(kSeed);
+  std::vector<Flight> flights{{0.1, 0.3, 7}, {0.17, 0.3, 7}};
+  for (int i = 0; i < 3; ++i) {
+    flights.push_back({random.Draw(0.1, 0.17), random.Draw(0.29, 0.38), 6});
+  }
+  for (const Flight& flight : flights) {
+    const Synthesis synthesis = WalkUpAndDown(library, flight);
+    for (const WalkRecord& walk : synthesis.walks) EXPECT_TRUE(walk.arrived) << walk.reason;
+    Looks looks;
+    MeasurePelvis(synthesis.clip, looks);
+    MeasureLegs(*library, synthesis, looks);
+    looks.climb_m = LargestClimb(synthesis);
+    std::printf(
+        "%4.1f x %4.1f cm: feet swing up to %4.1f cm above footprints, knees %5.1f deg, %4.0f "
+        "deg/s, pelvis %4.1f m/s2, usually below %4.1f, steps climb up to %4.1f cm\n",
+        1e2 * flight.rise_m, 1e2 * flight.tread_m, 1e2 * looks.swing_m, looks.knee_deg,
+        looks.knee_deg_per_s, looks.acceleration, looks.usual_acceleration, 1e2 * looks.climb_m);
+    EXPECT_LE(looks.swing_m, kMostSwingM);
+    EXPECT_LE(looks.knee_deg, kMostKneeDeg);
+    EXPECT_LE(looks.knee_deg_per_s, kMostKneeDegPerS);
+    EXPECT_LE(looks.acceleration, kMostAcceleration);
+    EXPECT_LE(looks.usual_acceleration, kMostUsualAcceleration);
+    EXPECT_LE(looks.climb_m, kMostClimbM);
+  }
+}
+
+}  // namespace
+}  // namespace stridewire
