@@ -149,23 +149,6 @@ struct StoredGroup {
   }
 };
 
-// Replaces the selected examples by smooth functions of their parameters, which are fitted to all
-// examples except outliers.
-std::optional<Smoothness> Smooth(const RawGroup& group, std::vector<GridExample> found,
-                                 const GroupSelection& selection, const std::vector<int>& cells,
-                                 const GridLayout& layout, const Skeleton& skeleton,
-                                 std::vector<GridExample>& examples) {
-  std::size_t i = 0;
-  std::erase_if(found, [&](const GridExample&) {
-    return selection.examples[i++].fate == ExampleFate::kOutlier;
-  });
-  const StoredGroup stored(found, cells, layout);
-  MotionGroup view = stored.View();
-  view.kind = group.kind;
-  view.parameters = ParametersOf(group, found);
-  return SmoothExamples(view, layout, skeleton, examples);
-}
-
 Status FitWeights(std::span<const double> scales, StoredGroup& stored) {
   const std::size_t d = scales.size();
   Expected<CardinalBasis> basis =
@@ -187,24 +170,153 @@ Status FitSmoothWeights(std::span<const double> scales, StoredGroup& stored,
   return {};
 }
 
-template <typename Note>
-void NoteSelection(const GroupSelection& selection, std::size_t stored, const Note& note) {
-  const int averaged = selection.Count(ExampleFate::kAveraged);
-  const int kept = selection.Count(ExampleFate::kKept);
-  if (averaged > 0) {
-    note(std::to_string(averaged + kept) + " examples averaged to " + std::to_string(stored));
+// Converts the groups of a raw library to the form in which library files contain them.
+class GroupConverter {
+ public:
+  // The notes and selections of `builder` receive what the converter does.
+  GroupConverter(const RawLibrary& raw, LibraryBuilder& builder)
+      : raw_(raw), builder_(builder), layout_(raw.skeleton.joint_count()) {}
+
+  // Converts a group of the library, unless it has no examples.
+  Status Add(std::size_t index) {
+    const RawGroup& group = raw_.groups[index];
+    if (group.examples.empty()) return {};
+    index_ = static_cast<int>(index);
+    for (const RawExample& example : group.examples) {
+      Status status = ValidateExample(group, example, raw_.skeleton.joint_count());
+      if (!status) return status;
+    }
+    const std::vector<int> cells = ChooseCells(group, builder_.grid_fps, layout_, stand_root());
+    std::optional<Smoothness> smoothness;
+    const std::vector<GridExample> examples = SelectExamples(group, cells, smoothness);
+    StoredGroup& stored =
+        *groups_.emplace_back(std::make_unique<StoredGroup>(examples, cells, layout_));
+    return AddView(group, examples, smoothness.has_value(), stored);
   }
-  const int redundant = selection.Count(ExampleFate::kRedundant);
-  if (redundant > 0) {
-    note(std::to_string(redundant) + " redundant examples dropped; the " + std::to_string(stored) +
-         " stored examples reproduce them");
+
+  [[nodiscard]] const std::vector<MotionGroup>& views() const { return views_; }
+
+ private:
+  [[nodiscard]] const Quat& stand_root() const { return raw_.stand_pose.rotations[0]; }
+  void Note(std::string text) { builder_.notes.push_back({index_, std::move(text)}); }
+
+  std::vector<GridExample> Resample(const RawGroup& group, const std::vector<int>& cells) const {
+    std::vector<GridExample> examples;
+    examples.reserve(group.examples.size());
+    for (const RawExample& example : group.examples) {
+      examples.push_back(ResampleOnGrid(example, cells, layout_, stand_root()));
+    }
+    AlignHemispheres(examples, layout_, raw_.skeleton.joint_count());
+    return examples;
   }
-  for (const SelectedExample& example : selection.examples) {
-    if (example.fate != ExampleFate::kOutlier) continue;
-    note(example.source + (example.mirrored ? ", mirrored" : "") +
-         " dropped as an outlier: " + example.reason);
+
+  // Returns the examples to store. Sets `smoothness` if they are smooth functions of their
+  // parameters.
+  std::vector<GridExample> SelectExamples(const RawGroup& group, const std::vector<int>& cells,
+                                          std::optional<Smoothness>& smoothness) {
+    std::vector<GridExample> found = Resample(group, cells);
+    std::vector<double> units(group.parameters.size(), 1.0);
+    for (std::size_t l = 0; l < units.size(); ++l) {
+      if (group.parameters[l] == ParameterName::kTurn) units[l] = kMetresPerRadian;
+    }
+    // Generated examples have no individual variation, so there is nothing to average or to drop.
+    const bool selects = !group.is_completed;
+    const double diameter =
+        std::max(selects ? builder_.cluster_diameter : 0.0, 10.0 * kMinSiteDistance);
+    const SelectionOptions& options = selects ? builder_.selection : SelectionOptions();
+    Selected selected =
+        SelectExamplesJob{found, units, diameter, options, layout_, raw_.skeleton, group}.Run();
+    std::vector<GridExample> examples = std::move(selected.examples);
+    GroupSelection& report = selected.report;
+    report.group = index_;
+    STRIDEWIRE_CHECK(!examples.empty() && examples.size() == selected.clusters.size());
+    NoteSelection(report, examples.size());
+    if (builder_.smooths && selects) {
+      std::size_t i = 0;
+      std::erase_if(found, [&](const GridExample&) {
+        return report.examples[i++].fate == ExampleFate::kOutlier;
+      });
+      smoothness = Smooth(group, found, cells, examples);
+    }
+    if (smoothness) {
+      report.ridge = smoothness->ridge;
+      report.ridge_radius = smoothness->radius;
+      Note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
+    }
+    STRIDEWIRE_CHECK(report.examples.size() == group.examples.size());
+    builder_.selections.push_back(std::move(report));
+    return examples;
   }
-}
+
+  // Replaces `examples` by smooth functions of their parameters, which are fitted to all `found`
+  // examples.
+  std::optional<Smoothness> Smooth(const RawGroup& group, const std::vector<GridExample>& found,
+                                   const std::vector<int>& cells,
+                                   std::vector<GridExample>& examples) const {
+    const StoredGroup stored(found, cells, layout_);
+    MotionGroup view = stored.View();
+    view.kind = group.kind;
+    view.parameters = ParametersOf(group, found);
+    return SmoothExamples(view, layout_, raw_.skeleton, examples);
+  }
+
+  void NoteSelection(const GroupSelection& selection, std::size_t stored) {
+    const int averaged = selection.Count(ExampleFate::kAveraged);
+    const int kept = selection.Count(ExampleFate::kKept);
+    if (averaged > 0) {
+      Note(std::to_string(averaged + kept) + " examples averaged to " + std::to_string(stored));
+    }
+    const int redundant = selection.Count(ExampleFate::kRedundant);
+    if (redundant > 0) {
+      Note(std::to_string(redundant) + " redundant examples dropped; the " +
+           std::to_string(stored) + " stored examples reproduce them");
+    }
+    for (const SelectedExample& example : selection.examples) {
+      if (example.fate != ExampleFate::kOutlier) continue;
+      Note(example.source + (example.mirrored ? ", mirrored" : "") +
+           " dropped as an outlier: " + example.reason);
+    }
+  }
+
+  // Fits the weights of the stored examples and appends a view of them.
+  Status AddView(const RawGroup& group, const std::vector<GridExample>& examples, bool is_smooth,
+                 StoredGroup& stored) {
+    MotionGroup view = stored.View();
+    view.kind = group.kind;
+    view.parameters = ParametersOf(group, examples);
+    std::vector<double> scales;
+    for (const Parameter& parameter : view.parameters) {
+      scales.push_back(parameter.scale);
+      if (examples.size() > 1 && parameter.max - parameter.min <= kMinSpread) {
+        Note(std::string(ParameterText(parameter.name)) +
+             " is equal in all examples: requests for other values have no effect");
+      }
+    }
+    if (Status status = is_smooth ? FitSmoothWeights(scales, stored, view.radius_factor)
+                                  : FitWeights(scales, stored);
+        !status) {
+      Error error = status.error();
+      error.where = "group " + std::string(MovementKindName(group.kind));
+      return std::unexpected(error);
+    }
+    STRIDEWIRE_CHECK(stored.basis.centres.size() == scales.size());
+    view.dilations = stored.basis.dilations;
+    view.linear = stored.basis.linear;
+    view.radial = stored.basis.radial;
+    for (std::size_t l = 0; l < scales.size(); ++l) {
+      view.parameters[l].centre = stored.basis.centres[l];
+    }
+    views_.push_back(std::move(view));
+    return {};
+  }
+
+  const RawLibrary& raw_;
+  LibraryBuilder& builder_;
+  GridLayout layout_;
+  int index_ = 0;                                     // Of the current group.
+  std::vector<std::unique_ptr<StoredGroup>> groups_;  // Own the data that `views_` refer to.
+  std::vector<MotionGroup> views_;
+};
 
 }  // namespace
 
@@ -226,95 +338,17 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
   notes.clear();
   selections.clear();
   if (Status status = raw.skeleton.Validate(); !status) return std::unexpected(status.error());
-  const int joint_count = raw.skeleton.joint_count();
-  if (static_cast<int>(raw.stand_pose.rotations.size()) != joint_count) {
+  if (static_cast<int>(raw.stand_pose.rotations.size()) != raw.skeleton.joint_count()) {
     return Fail(ErrorCode::kShapeMismatch, "stand_pose and skeleton have different joints");
   }
-  const GridLayout layout(joint_count);
-  const Quat& stand_root = raw.stand_pose.rotations[0];
-
-  std::vector<std::unique_ptr<StoredGroup>> groups;  // Own the data that `views` refers to.
-  std::vector<MotionGroup> views;
+  GroupConverter converter(raw, *this);
   for (std::size_t g = 0; g < raw.groups.size(); ++g) {
-    const RawGroup& group = raw.groups[g];
-    if (group.examples.empty()) continue;
-    const auto note = [&](std::string text) {
-      notes.push_back({static_cast<int>(g), std::move(text)});
-    };
-    for (const RawExample& example : group.examples) {
-      if (Status status = ValidateExample(group, example, joint_count); !status) {
-        return std::unexpected(status.error());
-      }
-    }
-
-    const std::vector<int> cells = ChooseCells(group, grid_fps, layout, stand_root);
-    std::vector<GridExample> found;
-    found.reserve(group.examples.size());
-    for (const RawExample& example : group.examples) {
-      found.push_back(ResampleOnGrid(example, cells, layout, stand_root));
-    }
-    AlignHemispheres(found, layout, joint_count);
-
-    std::vector<double> units(group.parameters.size(), 1.0);
-    for (std::size_t l = 0; l < units.size(); ++l) {
-      if (group.parameters[l] == ParameterName::kTurn) units[l] = kMetresPerRadian;
-    }
-    // Generated examples have no individual variation, so there is nothing to average or to drop.
-    const bool selects = !group.is_completed;
-    const double diameter = std::max(selects ? cluster_diameter : 0.0, 10.0 * kMinSiteDistance);
-    const SelectionOptions& options = selects ? selection : SelectionOptions();
-    Selected selected =
-        SelectExamplesJob{found, units, diameter, options, layout, raw.skeleton, group}.Run();
-    std::vector<GridExample> examples = std::move(selected.examples);
-    selected.report.group = static_cast<int>(g);
-    STRIDEWIRE_CHECK(!examples.empty() && examples.size() == selected.clusters.size());
-    NoteSelection(selected.report, examples.size(), note);
-    std::optional<Smoothness> smoothness;
-    if (smooths && selects) {
-      smoothness =
-          Smooth(group, std::move(found), selected.report, cells, layout, raw.skeleton, examples);
-    }
-    if (smoothness) {
-      selected.report.ridge = smoothness->ridge;
-      selected.report.ridge_radius = smoothness->radius;
-      note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
-    }
-    STRIDEWIRE_CHECK(selected.report.examples.size() == group.examples.size());
-    selections.push_back(std::move(selected.report));
-
-    StoredGroup& stored =
-        *groups.emplace_back(std::make_unique<StoredGroup>(examples, cells, layout));
-    MotionGroup view = stored.View();
-    view.kind = group.kind;
-    view.parameters = ParametersOf(group, examples);
-    std::vector<double> scales;
-    for (const Parameter& parameter : view.parameters) {
-      scales.push_back(parameter.scale);
-      if (examples.size() > 1 && parameter.max - parameter.min <= kMinSpread) {
-        note(std::string(ParameterText(parameter.name)) +
-             " is equal in all examples: requests for other values have no effect");
-      }
-    }
-    if (Status status = smoothness ? FitSmoothWeights(scales, stored, view.radius_factor)
-                                   : FitWeights(scales, stored);
-        !status) {
-      Error error = status.error();
-      error.where = "group " + std::string(MovementKindName(group.kind));
-      return std::unexpected(error);
-    }
-    STRIDEWIRE_CHECK(stored.basis.centres.size() == scales.size());
-    view.dilations = stored.basis.dilations;
-    view.linear = stored.basis.linear;
-    view.radial = stored.basis.radial;
-    for (std::size_t l = 0; l < scales.size(); ++l) {
-      view.parameters[l].centre = stored.basis.centres[l];
-    }
-    views.push_back(std::move(view));
+    if (Status status = converter.Add(g); !status) return std::unexpected(status.error());
   }
-  STRIDEWIRE_CHECK(views.size() == groups.size() && views.size() == selections.size());
+  STRIDEWIRE_CHECK(converter.views().size() == selections.size());
   Expected<StoredLayers> layers = StoreLayers(raw.layers, raw.skeleton);
   if (!layers) return std::unexpected(layers.error());
-  return WriteLibrary({raw.skeleton, raw.stand_pose, views, layers->views()});
+  return WriteLibrary({raw.skeleton, raw.stand_pose, converter.views(), layers->views()});
 }
 
 }  // namespace stridewire
