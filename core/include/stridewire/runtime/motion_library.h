@@ -134,7 +134,7 @@ struct MotionGroup {
   std::span<const double> site_weights;  ///< [site - n][example]: weights of pseudoexamples.
   /// [site]: radius of influence, in units of Parameter::scale.
   std::span<const double> dilations;
-  double radius_factor = 1.0;  ///< Factor that `dilations` of the examples include.
+  double radius_factor = 1.0;  ///< Factor by which the `dilations` of the examples were multiplied.
   /// [1 + d][example]: coefficients a of the linear part. Row 0 is the constant.
   std::span<const double> linear;
   /// [site][example]: coefficients r of the radial functions.
