@@ -1,4 +1,4 @@
-// Every capture gives movements or a reason why it does not.
+// Every capture yields movements, or a reason why it yields none.
 
 #include <gtest/gtest.h>
 

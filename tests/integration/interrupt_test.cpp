@@ -163,7 +163,7 @@ TEST_P(InterruptLibraries, IsSmoothAtAnyTime) {
     std::printf(
         "%s, %s: seed %u, %d avatars, %d requests in mid-movement, %d cut short; drift %.4f mm; "
         "joints step by "
-        "%.2f rad/s at takeovers (median; %.2f the worst of a hundred), at most %.2f where "
+        "%.2f rad/s at interrupts (median; 99th percentile %.2f), at most %.2f where "
         "movements begin, "
         "%.2f elsewhere, %.2f in the examples (ratio %.2f)\n",
         walker.name, blend == BlendKind::kCubic ? "cubic" : "inertial", seed, avatars,

@@ -167,7 +167,7 @@ TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
   EXPECT_GT(figures.records, figures.states);
 }
 
-// Walking, which is what most avatars do most of the time.
+// Most avatars walk most of the time, so the size of these records matters most.
 TEST_P(ReplicaLibraries, RecordsOfStepsAreSmall) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261124;

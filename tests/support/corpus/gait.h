@@ -15,7 +15,7 @@ struct Footprint {
   double lift_s = 1e9;
 };
 
-/// Where the middle of the feet is at some time.
+/// The point midway between the feet at a time.
 struct Waypoint {
   double time_s = 0.0;
   DVec3 ground_m = DVec3(0.0);

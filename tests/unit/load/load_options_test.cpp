@@ -19,7 +19,7 @@ Expected<LoadCommandLine> Read(const Arguments& arguments) {
 const Arguments kEnough = {"--connect", "127.0.0.1:7420", "--avatars", "10", "--observers",
                            "2",         "--seconds",      "1.5"};
 
-/// Parses the required options and these.
+/// Returns the required options followed by `more`.
 Arguments With(const Arguments& more) {
   Arguments all = kEnough;
   all.insert(all.end(), more.begin(), more.end());
