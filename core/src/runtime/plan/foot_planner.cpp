@@ -44,7 +44,8 @@ constexpr double kNoticeableLiftM = 0.01;
 constexpr double kMaxAdvanceM = 0.12;
 constexpr double kSteepnessWeight = 0.1;
 constexpr double kAdvanceCost = 0.2;
-constexpr std::array<double, 8> kAdvances{-0.25, 0.25, -0.5, 0.5, -0.75, 0.75, -1.0, 1.0};
+constexpr std::array<double, 12> kAdvances{-1.0 / 6, 1.0 / 6, -1.0 / 3, 1.0 / 3, -0.5, 0.5,
+                                           -2.0 / 3, 2.0 / 3, -5.0 / 6, 5.0 / 6, -1.0, 1.0};
 
 // Fractions of the swing at which the reach of the legs is checked.
 constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
