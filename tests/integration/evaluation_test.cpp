@@ -280,7 +280,7 @@ TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
 // changes, and the protocol needs a new version. Otherwise clients that evaluate
 // movements with the old formulas would display other poses than the server (decision 0021).
 TEST(Evaluation, MatchesTheProtocolVersion) {
-  DrawnCrowd crowd(LibraryOf({}), 24, 10, /*idle_motion=*/false);
+  DrawnCrowd crowd(LibraryOf({}), 24, 10, {.idle_motion = false});
   std::string bytes;
   for (int tick = 0; tick < 300; ++tick) {
     crowd.Advance();
@@ -290,11 +290,29 @@ TEST(Evaluation, MatchesTheProtocolVersion) {
   EXPECT_EQ(protocol::kProtocolVersion, 1u);
 }
 
+// The same for the variation of steps. Replicas receive its results, so a new hash needs no new
+// version of the protocol.
+TEST(Evaluation, StrideVariationHasTheSameBytesOnEveryMachine) {
+  std::string bytes;
+  for (std::uint64_t seed = 0; seed < 4; ++seed) {
+    AvatarSimulation avatar(LibraryOf({}), {},
+                            {.idle_motion = false, .stride_variation = true, .seed = seed});
+    for (int step = 0; step < 12; ++step) {
+      ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.6}}));
+    }
+    for (int tick = 0; tick < 400; ++tick) {
+      avatar.Advance(1.0 / 60.0);
+      AppendBytes(avatar, bytes);
+    }
+  }
+  EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0x2d37c6cb677a4d88u);
+}
+
 // The same for standing avatars, whose motion is generated when a library is opened.
 TEST(Evaluation, IdleMotionMatchesTheProtocolVersion) {
   std::string bytes;
   for (std::uint64_t seed = 0; seed < 4; ++seed) {
-    AvatarSimulation avatar(LibraryOf({}), {}, {.idle_seed = seed});
+    AvatarSimulation avatar(LibraryOf({}), {}, {.seed = seed});
     for (int tick = 0; tick < 600; ++tick) {
       avatar.Advance(1.0 / 60.0);
       AppendBytes(avatar, bytes);

@@ -153,7 +153,7 @@ TEST_P(IdleMotion, StartsAndEndsSmoothly) {
     double largest_rad = 0.0;
     for (int round = 0; round < 12; ++round) {
       AvatarSimulation avatar =
-          Make({.idle_motion = idle_motion, .idle_seed = static_cast<std::uint64_t>(round)});
+          Make({.idle_motion = idle_motion, .seed = static_cast<std::uint64_t>(round)});
       AdvanceFor(avatar, 0.25 * round);
       for (int walk = 0; walk < 3; ++walk) {
         Walk(avatar, 1 + round % 3);
@@ -212,7 +212,7 @@ TEST_P(IdleMotion, HasTheSameBytesOnEveryInstructionSet) {
   std::vector<std::string> first;
   for (const std::int64_t set : InstructionSets()) {
     const OnlyInstructionSet only(set);
-    AvatarSimulation avatar = Make({.idle_seed = 5});
+    AvatarSimulation avatar = Make({.seed = 5});
     Walk(avatar);
     std::vector<std::string> ticks;
     for (int tick = 0; tick < 900; ++tick) {
@@ -236,7 +236,7 @@ class BuiltinIdleMotion : public testing::Test {
 
 TEST_F(BuiltinIdleMotion, DiffersBySeedAndByNothingElse) {
   const auto bytes_of = [&](std::uint64_t seed, double tick_s) {
-    AvatarSimulation avatar(library_, {}, {.idle_seed = seed});
+    AvatarSimulation avatar(library_, {}, {.seed = seed});
     for (int tick = 0; tick < 4.0 / tick_s; ++tick) avatar.Advance(tick_s);
     return BytesOf(avatar.pose());
   };

@@ -58,7 +58,8 @@ class RandomlyDriven {
                  .foot_planting = Draws(0.8),
                  .blend = Draws(0.8) ? BlendKind::kInertialization : BlendKind::kCubic,
                  .idle_motion = Draws(0.8),
-                 .idle_seed = static_cast<std::uint64_t>(random.Draw(0.0, 1000.0)),
+                 .stride_variation = Draws(0.8),
+                 .seed = static_cast<std::uint64_t>(random.Draw(0.0, 1000.0)),
                  .terrain = Draws(0.5) ? RoughGround(random) : nullptr}) {}
 
   // Changes something about the avatar between two ticks.

@@ -70,13 +70,13 @@ inline void DrawLayer(Random& random, AvatarSimulation& avatar) {
 class DrawnCrowd {
  public:
   DrawnCrowd(const std::shared_ptr<const MotionLibrary>& library, int size, unsigned seed,
-             bool idle_motion = true)
+             const AvatarOptions& options = {})
       : random_(seed), plan_scratch_(*library), evaluator_(*library, 1) {
     for (int i = 0; i < size; ++i) {
-      avatars_.emplace_back(library, DrawBase(random_),
-                            AvatarOptions{.idle_motion = idle_motion,
-                                          .idle_seed = static_cast<std::uint64_t>(i),
-                                          .terrain = i % 2 == 0 ? nullptr : RoughGround(random_)});
+      AvatarOptions own = options;
+      own.seed = static_cast<std::uint64_t>(i);
+      if (i % 2 != 0) own.terrain = RoughGround(random_);
+      avatars_.emplace_back(library, DrawBase(random_), own);
     }
   }
 

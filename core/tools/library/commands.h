@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +42,8 @@ struct SynthesizeCommand {
   bool no_correction = false;
   bool no_planting = false;
   bool no_idle = false;
+  bool no_variation = false;
+  std::uint64_t seed = 0;
   bool json = false;
 };
 int RunSynthesize(const SynthesizeCommand& command);

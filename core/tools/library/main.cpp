@@ -169,6 +169,11 @@ int Run(int argc, char** argv) {
                            "Do not plant feet; the blended feet may slide");
   synthesize_app->add_flag("--no-idle", synthesize.no_idle,
                            "Keep standing avatars still in their last pose");
+  synthesize_app->add_flag("--no-variation", synthesize.no_variation, "Repeat equal steps exactly");
+  synthesize_app
+      ->add_option("--seed", synthesize.seed,
+                   "Seed of the idle motion and of the variation of steps")
+      ->capture_default_str();
   AddJson(synthesize_app, synthesize.json);
   synthesize_app->footer(
       "Example:\n  echo '{\"movements\":[{\"step\":{\"length_m\":0.6}}]}' > c.json\n"

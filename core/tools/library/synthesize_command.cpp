@@ -86,6 +86,8 @@ int RunSynthesize(const SynthesizeCommand& command) {
                              .options = {.run_time_correction = !command.no_correction,
                                          .foot_planting = !command.no_planting,
                                          .idle_motion = !command.no_idle,
+                                         .stride_variation = !command.no_variation,
+                                         .seed = command.seed,
                                          .terrain = choreography->terrain},
                              .layers = choreography->layers};
   const auto synthesis = Synthesize(input);

@@ -107,7 +107,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
       continue;
     }
     const BaseFrame start = FromWire(item.spawn.start);
-    options.idle_seed = id;
+    options.seed = id;
     avatars_.emplace(id, Entry{.avatar = AvatarSimulation(world_->library, start, options),
                                .owner = command.session,
                                .spawn_tick = tick});

@@ -82,9 +82,13 @@ struct AvatarOptions {
   /// weight. Their feet do not move. If false, or if feet are not planted, avatars stand still in
   /// the last pose of their last movement.
   bool idle_motion = true;
-  /// Selects the place in the loop of the idle motion, so that avatars of a crowd do not move in
-  /// unison.
-  std::uint64_t idle_seed = 0;
+  /// Let the duration and the pose of steps vary slightly, as those of people do. Steps meet their
+  /// parameters and footprints as accurately as without variation. Steps with `exact_only` do not
+  /// vary. If false, equal steps are repeated exactly.
+  bool stride_variation = false;
+  /// Selects the place in the loop of the idle motion and the variation of steps, so that avatars
+  /// of a crowd do not move in unison.
+  std::uint64_t seed = 0;
   /// Ground that the feet land on. Null: level ground at the avatar's height; requests with a
   /// height then raise or lower it.
   std::shared_ptr<const Terrain> terrain;

@@ -98,9 +98,10 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
     const double further = i == 0 ? 1.0 : kOvershoot;
     aim.position_m += further * (error.nearest.position_m - aim.position_m);
     aim.heading_rad += further * (error.nearest.heading_rad - aim.heading_rad);
-    const auto plan =
-        PlanRequest({.movement = StepRequest{
-                         .foot = moving, .at = FootprintRequest{aim.position_m, aim.heading_rad}}});
+    const auto plan = PlanRequest(
+        {.movement = StepRequest{.foot = moving,
+                                 .at = FootprintRequest{aim.position_m, aim.heading_rad},
+                                 .exact_only = true}});
     STRIDEWIRE_CHECK(plan.has_value() && plan->exact.has_value());
     PlanMovement(*plan, start_phase, scratch);
     error = LandingErrorFrom(*plan->exact);

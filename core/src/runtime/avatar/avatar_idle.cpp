@@ -11,6 +11,7 @@
 #include <cstdint>
 
 #include "base/check.h"
+#include "base/scramble.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/stand_motion.h"
 
@@ -18,15 +19,7 @@ namespace stridewire {
 namespace {
 
 // Returns the place in the idle loop at which an avatar with this seed begins, in seconds.
-double LoopStart(std::uint64_t seed) {
-  // SplitMix64 (Steele, Lea, Flood 2014): neighbouring seeds give unrelated places.
-  std::uint64_t bits = seed + 0x9e3779b97f4a7c15u;
-  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
-  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
-  bits ^= bits >> 31;
-  constexpr double kPerUnit = 1.0 / 9007199254740992.0;  // 2^-53
-  return kIdleLoopS * static_cast<double>(bits >> 11) * kPerUnit;
-}
+double LoopStart(std::uint64_t seed) { return kIdleLoopS * FractionOf(Scramble(seed)); }
 
 }  // namespace
 
@@ -54,7 +47,7 @@ void AvatarSimulation::BeginIdleMotion(double left_s, PlanScratch& scratch) {
   body_.StartWeighted(base_, 1.0);
   // The place in the loop depends on the seed and the time only, so that the motion continues if
   // it is interrupted for a moment.
-  const double place_s = std::fmod(LoopStart(options_.idle_seed) + time_s_, kIdleLoopS);
+  const double place_s = std::fmod(LoopStart(options_.seed) + time_s_, kIdleLoopS);
   if (!settles) body_.SetStartOffset(place_s);
   body_.BlendIn(LandingDecision{.is_on_terrain = options_.terrain != nullptr}, keeps_speed(),
                 scratch.feet);

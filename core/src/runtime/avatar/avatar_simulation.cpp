@@ -7,6 +7,7 @@
 #include "base/check.h"
 #include "base/prefetch.h"
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/movement/stride_variation.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "runtime/weights/correction.h"
@@ -457,8 +458,11 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
     const double side_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
     foot = side_m >= 0.0 ? Foot::kLeft : Foot::kRight;
   }
-  return PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
-                       base_.heading_rad, feet_);
+  auto plan = PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
+                            base_.heading_rad, feet_);
+  // Whether a leg reaches a footprint depends on the whole pose, so such a step must not vary.
+  if (plan) plan->is_varied = !step.exact_only;
+  return plan;
 }
 
 void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id,
@@ -476,9 +480,13 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
                    static_cast<std::size_t>(plan.group) < body_.library->groups().size());
   const MotionGroup& next = body_.library->group(plan.group);
   STRIDEWIRE_CHECK(plan.applied.count == next.parameter_count());
+  std::optional<StrideVariation> variation;
+  if (options_.stride_variation && plan.is_varied && IsStep(next.kind)) {
+    variation.emplace(options_.seed, movement_number_);
+  }
   if (options_.run_time_correction) {
     CorrectWeights(next, plan.applied, DefaultCorrectionLimits(next), scratch.correction,
-                   body_.movement);
+                   body_.movement, variation);
     body_.movement.group = plan.group;
   } else {
     SetWeights(next, plan.group,
@@ -486,8 +494,9 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
                scratch.correction.weights(next), body_.movement);
   }
   body_.StartWeighted(base_, 1.0);
-  const double rate = std::clamp(body_.movement.duration_s() / kQuickStepS, 1.0, plan.max_rate);
-  if (rate > 1.0) body_.StartWeighted(base_, rate);
+  double rate = std::clamp(body_.movement.duration_s() / kQuickStepS, 1.0, plan.max_rate);
+  if (variation) rate *= variation->RateFactor();
+  if (rate != 1.0) body_.StartWeighted(base_, rate);
   if (start_phase > 0.0) {
     body_.SetStartOffset(TimeAtPhase(SwingTimesOf(next.kind, body_.movement), start_phase));
   }
@@ -508,6 +517,7 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
   STRIDEWIRE_CHECK(!is_in_stand_ && !is_idling_ && body_.movement.group == plan.group);
   STRIDEWIRE_CHECK(body_.movement.feet.is_active == body_.plants_feet);
   ++revision_;
+  ++movement_number_;
   change_.has_begun = true;
   change_.begun_keeps_speed = keeps_speed();
   is_moving_ = true;

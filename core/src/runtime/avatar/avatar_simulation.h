@@ -264,7 +264,8 @@ class AvatarSimulation {
   bool is_exact_ = false;  // True if the current step goes to a requested footprint.
   // Number of steps that were inserted in a row, including the current movement.
   int inserted_steps_ = 0;
-  double start_not_before_s_ = 0.0;  // Avatar time.
+  std::uint64_t movement_number_ = 0;  // Number of movements that have begun.
+  double start_not_before_s_ = 0.0;    // Avatar time.
   // Avatar time at which the last movement with a velocity ended, or -1.
   double moved_until_s_ = -1.0;
 

@@ -34,6 +34,7 @@ struct RequestPlan {
   /// Steps: largest turn in addition to that of the examples, to meet `turn_rad`.
   double max_extra_turn_rad = kMaxExtraTurnRad;
   bool is_side_given = false;  ///< Steps: true if the request specified the side.
+  bool is_varied = true;       ///< Steps: true if the step may deviate (see StrideVariation).
   /// Largest playback speed. The movement is played as fast as is needed to shorten it to
   /// kQuickStepS.
   double max_rate = 1.0;

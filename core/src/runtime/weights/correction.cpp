@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "runtime/pose/pose_kernels.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
@@ -24,6 +25,18 @@ constexpr double kShrinkErrorM = 1e-4;
 // Ridge added to the diagonal, relative to the trace. It handles directions that no example spans.
 constexpr double kRidge = 1e-9;
 constexpr int kMaxHalvings = 3;
+// Only the poses of groups with at most this many parameters vary, which are straight steps. Other
+// steps are rarely repeated, and their examples differ so much that soles would enter the ground.
+constexpr std::size_t kMaxVariedParameters = 2;
+// Size of a variation as measured by PoseChange, in radians. Larger ones push the toes of `builtin`
+// into the ground.
+constexpr double kVariedRad = 0.04;
+// Fractions of a step at which the pose is measured.
+constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
+// Largest change of a weight relative to its value, before the effect on the parameters is removed.
+constexpr double kMaxRelativeChange = 3.0;
+// A variation is given up if it leaves an error above this.
+constexpr double kMaxVariedErrorM = 1e-4;
 
 double Sum(std::span<const double> values) {
   double sum = 0.0;
@@ -101,16 +114,35 @@ class WeightStep {
     }
     SolveFactored(factor_, rows_, y);
     for (std::size_t e = 0; e < n_; ++e) {
-      double change = 0.0;
-      for (std::size_t a = 0; a < rows_; ++a) change += At(a, e) * y[a];
-      out[e] = (1.0 - shrinking) * weights_[e] + Usage(e) * change;
+      out[e] = (1.0 - shrinking) * weights_[e] + Usage(e) * Combine(y, e);
     }
-    const double left =
-        (1.0 - Sum(out)) / total_usage_;  // Correct the sum, which the ridge changes.
-    for (std::size_t e = 0; e < n_; ++e) out[e] += left * Usage(e);
+    SetSum(1.0, out);
+  }
+
+  // Writes the change of the weights [n] in the direction of `variation`, without the part that
+  // affects the parameters or the sum.
+  void Vary(const StrideVariation& variation, std::span<double> change) const {
+    for (std::size_t e = 0; e < n_; ++e) change[e] = variation.WeightDirection(e) * weights_[e];
+    Vector y{};
+    for (std::size_t a = 0; a < rows_; ++a) {
+      for (std::size_t e = 0; e < n_; ++e) y[a] += At(a, e) * change[e];
+    }
+    SolveFactored(factor_, rows_, y);
+    for (std::size_t e = 0; e < n_; ++e) change[e] -= Usage(e) * Combine(y, e);
+    SetSum(0.0, change);
   }
 
  private:
+  [[nodiscard]] double Combine(const Vector& y, std::size_t e) const {
+    double sum = 0.0;
+    for (std::size_t a = 0; a < rows_; ++a) sum += At(a, e) * y[a];
+    return sum;
+  }
+  // Corrects the sum, which the ridge changes.
+  void SetSum(double sum, std::span<double> out) const {
+    const double left = (sum - Sum(out)) / total_usage_;
+    for (std::size_t e = 0; e < n_; ++e) out[e] += left * Usage(e);
+  }
   [[nodiscard]] double Usage(std::size_t e) const { return std::fabs(weights_[e]) + min_usage_; }
   [[nodiscard]] double At(std::size_t row, std::size_t e) const {
     return row + 1 == rows_ ? 1.0 : slopes_[row * n_ + e];
@@ -125,6 +157,42 @@ class WeightStep {
   Matrix factor_{};
   bool is_solvable_ = false;
 };
+
+// Returns by how much the pose changes if the weights change by `change` [n], in radians: the root
+// of the sum of the squared rotations of all joints, averaged over kVariedAt.
+double PoseChange(const MotionGroup& group, const GridLayout& layout,
+                  std::span<const float> change) {
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  std::array<float, kMaxRowFloats> sum;
+  double squares = 0.0;
+  for (const double part : kVariedAt) {
+    const auto point = static_cast<std::size_t>(part * (group.grid_point_count - 1));
+    kernels::SumRows(&group.grid[point * change.size() * row_floats], change.data(), change.size(),
+                     row_floats, sum.data());
+    for (std::size_t j = 0; j < static_cast<std::size_t>(layout.joint_count); ++j) {
+      const DQuat q(GridLayout::RotationOf(sum.data(), j));
+      squares += 4.0 * glm::dot(q, q);
+    }
+  }
+  return std::sqrt(squares / static_cast<double>(kVariedAt.size()));
+}
+
+// Adds a change to the weights [n]. `size_rad` is its size as measured by PoseChange. Scales the
+// change to kVariedRad, as far as the limits on weights allow.
+void AddVariation(std::span<const double> change, double size_rad, double max_sum,
+                  std::span<double> weights) {
+  constexpr double kTiny = 1e-9;
+  const double scale = std::min(kMaxRelativeChange, kVariedRad / std::max(size_rad, kTiny));
+  double sum = 0.0;
+  for (std::size_t e = 0; e < weights.size(); ++e) {
+    sum += std::fabs(weights[e] + scale * change[e]);
+  }
+  // The sum of |w| is convex, so linear interpolation keeps it within its limit.
+  const double before = SumOfMagnitudes(weights);
+  const double room = std::max(0.0, max_sum - kMargin - before);
+  const double part = scale * std::min(1.0, room / std::max(sum - before, kTiny));
+  for (std::size_t e = 0; e < weights.size(); ++e) weights[e] += part * change[e];
+}
 
 }  // namespace
 
@@ -148,7 +216,7 @@ CorrectionScratch::CorrectionScratch(const MotionLibrary& library)
 
 Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
                           const CorrectionLimits& limits, CorrectionScratch& scratch,
-                          Movement& movement) {
+                          Movement& movement, const std::optional<StrideVariation>& variation) {
   const std::size_t d = group.parameters.size();
   const auto n = static_cast<std::size_t>(group.example_count);
   STRIDEWIRE_CHECK(n <= scratch.weights_.size() && d <= kMaxParameters);
@@ -180,10 +248,24 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
   };
 
   SetWeights(group, -1, std::span(wanted.values).first(d), weights, movement);
+  const double max_sum = std::max(kMaxCorrectedWeightSum, SumOfMagnitudes(weights));
+  const bool is_varied = variation.has_value() && d <= kMaxVariedParameters;
+  if (is_varied) {
+    for (std::size_t l = 0; l < d; ++l) {
+      for (std::size_t e = 0; e < n; ++e) {
+        slopes[l * n + e] = unit[l] * group.site(static_cast<int>(e))[l];
+      }
+    }
+    const WeightStep step(weights, slopes, d);
+    if (step.is_solvable()) {
+      step.Vary(*variation, next);
+      ApplyWeights(group, next, movement);
+      AddVariation(next, PoseChange(group, ends.layout(), movement.weights), max_sum, weights);
+    }
+  }
   ParameterError best = measure(weights);
   Correction correction;
   correction.initial_error_m = best.largest_m;
-  const double max_sum = std::max(kMaxCorrectedWeightSum, SumOfMagnitudes(weights));
   while (correction.iterations < limits.max_iterations && best.largest_m > limits.tolerance_m) {
     ++correction.iterations;
     ends.MeasureSlopes(slopes);
@@ -217,6 +299,9 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
       is_better = true;
     }
     if (!is_better) break;
+  }
+  if (is_varied && best.largest_m > kMaxVariedErrorM) {
+    return CorrectWeights(group, wanted, limits, scratch, movement);
   }
   ApplyWeights(group, weights, movement);
   correction.error_m = best.largest_m;

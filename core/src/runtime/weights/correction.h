@@ -1,9 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "runtime/movement/movement.h"
+#include "runtime/movement/stride_variation.h"
 #include "runtime/weights/end_poses.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
@@ -50,7 +52,8 @@ class CorrectionScratch {
  private:
   friend Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
                                    const CorrectionLimits& limits, CorrectionScratch& scratch,
-                                   Movement& movement);
+                                   Movement& movement,
+                                   const std::optional<StrideVariation>& variation);
 
   EndPoses ends_;
   std::vector<double> weights_;  // [example]
@@ -74,10 +77,16 @@ class CorrectionScratch {
 /// large is halved up to three times. The best w is kept, so the result is never worse than without
 /// correction. An error remains if no weights within the limit reach p^.
 ///
+/// With `variation`, the weights of groups with one or two parameters deviate before they are
+/// corrected. The part of the deviation that changes the parameters is removed to first order, with
+/// D as above. The rest is scaled to a fixed change of the pose. If the correction cannot reach p^
+/// from there, it is repeated without variation.
+///
 /// Sets movement.group to -1; a caller whose group is part of a library sets the index afterwards.
 /// Does not allocate if `movement.weights` has room for the group. Same bytes on every machine.
 Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
                           const CorrectionLimits& limits, CorrectionScratch& scratch,
-                          Movement& movement);
+                          Movement& movement,
+                          const std::optional<StrideVariation>& variation = std::nullopt);
 
 }  // namespace stridewire

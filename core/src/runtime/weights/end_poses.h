@@ -22,6 +22,8 @@ class EndPoses {
   /// Chooses the group to measure. Borrows it until the next call.
   void SetGroup(const MotionGroup& group);
 
+  [[nodiscard]] const GridLayout& layout() const { return layout_; }
+
   /// Blends both poses with the weights and the heading change of a movement (see ApplyWeights).
   void Blend(const Movement& movement);
 
