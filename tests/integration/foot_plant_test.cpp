@@ -10,6 +10,7 @@
 #include "offline/inspect/leg_survey.h"
 #include "plant_measure.h"
 #include "random.h"
+#include "runtime/skeleton/leg_rig.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/bvh_writer.h"
 
@@ -186,6 +187,37 @@ TEST_P(FootPlant, SolesStayOnLevelGround) {
               walker.name, seed, 1e3 * legs.hover_m, 1e3 * legs.sink_m);
   EXPECT_LE(legs.hover_m, 0.02);
   EXPECT_LE(legs.sink_m, 0.01);
+}
+
+// The toes of a foot that leaves the ground do not push into it, even if the foot leaves the ground
+// while the pose still blends from another one.
+TEST_P(FootPlant, ToesLeaveLevelGround) {
+  const Walker& walker = GetParam();
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
+  const Library library = LibraryOf(walker.subjects);
+  const unsigned seed = 20261126;
+  Random random(seed);
+  std::vector<MovementRequest> requests;
+  for (std::uint64_t id = 1; id <= 300; ++id) {
+    const double length_m = random.Draw(0.0, 1.0) < 0.5 ? 0.0 : walker.most_length_m;
+    const double turn_rad = random.Draw(-1.0, 1.0) * walker.most_turn_rad;
+    requests.push_back(
+        {.id = id, .movement = StepRequest{.length_m = length_m, .turn_rad = turn_rad}});
+  }
+  const auto synthesis = Synthesize({.library = library, .requests = requests, .fps = kFps});
+  ASSERT_TRUE(synthesis.has_value());
+  double sink_m = 0.0;
+  LegPose leg;
+  for (int frame = 0; frame < synthesis->clip.frame_count(); ++frame) {
+    const ConstPoseSpan pose = synthesis->clip.frame(frame);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      EvaluateLeg(library->skeleton(), library->leg_rig(), pose, foot, leg);
+      sink_m = std::max(sink_m, -static_cast<double>(pose.root_position_m.y + leg.toe_tip_m.y));
+    }
+  }
+  std::printf("%s: seed %u, toe tips at most %.1f mm below the ground\n", walker.name, seed,
+              1e3 * sink_m);
+  EXPECT_LE(sink_m, 0.008);  // The plan allows 3 mm, and 5 mm by which toes give way.
 }
 
 // A footprint in reach is met even if the examples do not span the step. For one out of reach, the

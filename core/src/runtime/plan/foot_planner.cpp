@@ -60,8 +60,11 @@ constexpr double kMaxAsideM = 0.05;
 constexpr double kMaxHoverM = 0.006;
 constexpr double kMaxSinkM = 0.003;
 constexpr double kMaxLevelM = 0.05;
-// On level ground, a swinging foot stays at least this far above it.
+// On level ground, a swinging foot stays at least this far above it. A foot that has just left the
+// ground may be kMaxSinkM below it, because its toes leave last. It is lifted by at most
+// kMaxEarlyLiftM.
 constexpr double kLevelClearanceM = 0.012;
+constexpr double kMaxEarlyLiftM = 0.03;
 // A foot that leaves the ground this early in the blend-in of its movement is not corrected fully.
 constexpr double kLeastSettled = 0.3;
 
@@ -76,6 +79,7 @@ constexpr double kPassingLengthM = 0.2;
 constexpr double kCrossingWidthM = 0.04;
 constexpr double kMaxPushM = 0.08;
 // Fractions of the swing and of the stance at which feet are sampled.
+constexpr std::array<double, 2> kEarlySamples{0.1, 0.18};
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
 constexpr std::array<double, 5> kStanceSamples{0.0, 0.25, 0.5, 0.75, 1.0};
@@ -124,6 +128,7 @@ double Levelling(double above_m) {
   return std::clamp(-excess_m, -kMaxLevelM, kMaxLevelM);
 }
 
+constexpr std::size_t kEarlyLift = 0;
 constexpr std::size_t kMiddleLift = 1;
 
 // A value at each of kClearanceSamples.
@@ -217,9 +222,13 @@ class Planner {
     };
     around(swing.release_s, kRelease - 1);
     around(swing.land_s, kLanding - 1);
-    for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
-      times_s_[kSwing + i] = swing.release_s + kSwingSamples[i] * (swing.land_s - swing.release_s);
-    }
+    const auto during = [&](std::span<const double> samples, std::size_t first) {
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        times_s_[first + i] = swing.release_s + samples[i] * (swing.land_s - swing.release_s);
+      }
+    };
+    during(kEarlySamples, kEarly);
+    during(kSwingSamples, kSwing);
     times_s_[kEntry] = movement_.start_offset_s;
     times_s_[kEntry + 1] = movement_.start_offset_s + kBlendStepS;
     times_s_[kBlendedEnd] = movement_.duration_s();
@@ -397,23 +406,14 @@ class Planner {
     trajectory.land_offset_m = trajectory.to.position_m - landing.ball_m;
   }
 
-  // Returns the lift in the middle of the swing (FootTrajectory::lift_m) that the moving foot of a
-  // step without terrain needs to stay above the ground between its footprints.
-  double LevelLift(Foot moving) {
-    const FootTrajectory& trajectory = movement_.feet.foot(moving);
-    double lift_m = 0.0;
-    for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
-      const double part = kSwingSamples[i];
-      const BlendedFoot blended{.ball_m = sampler_.Ball(kSwing + i, moving)};
-      const FootCorrection correction =
-          CorrectFoot(movement_, moving, times_s_[kSwing + i], blended);
-      const double from_m = trajectory.from.position_m.y;
-      const double ground_m = from_m + part * (trajectory.to.position_m.y - from_m);
-      const double clearance_m =
-          sampler_.LowestSole(kSwing + i, moving) + correction.offset_m.y - ground_m;
-      lift_m = std::max(lift_m, (kLevelClearanceM - clearance_m) / LiftShare(kMiddleLift, part));
-    }
-    return std::min(lift_m, kMaxLiftM);
+  // Sets the lifts (FootTrajectory::lift_m) that the moving foot of a step without terrain needs to
+  // stay above the ground between its footprints.
+  void LiftOverLevelGround(Foot moving) {
+    std::array<double, 3>& lift_m = movement_.feet.foot(moving).lift_m;
+    lift_m[kEarlyLift] =
+        std::min(LevelLift(moving, kEarlyLift, -kMaxSinkM, kEarlySamples, kEarly), kMaxEarlyLiftM);
+    lift_m[kMiddleLift] = std::min(
+        LevelLift(moving, kMiddleLift, kLevelClearanceM, kSwingSamples, kSwing), kMaxLiftM);
   }
 
   // Returns the outward push that the swinging foot needs to pass the standing leg.
@@ -589,6 +589,26 @@ class Planner {
                        trajectory.to.position_m.y);
   }
 
+  // Returns the lift `lift` (FootTrajectory::lift_m) with which the moving foot is at least
+  // `clearance_m` above level ground at these fractions of its swing. `first` is the index of the
+  // first of them in times_s_.
+  double LevelLift(Foot moving, std::size_t lift, double clearance_m,
+                   std::span<const double> samples, std::size_t first) const {
+    const FootTrajectory& trajectory = movement_.feet.foot(moving);
+    const double from_m = trajectory.from.position_m.y;
+    double lift_m = 0.0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const BlendedFoot blended{.ball_m = sampler_.Ball(first + i, moving)};
+      const FootCorrection correction =
+          CorrectFoot(movement_, moving, times_s_[first + i], blended);
+      const double ground_m = from_m + samples[i] * (trajectory.to.position_m.y - from_m);
+      const double above_m =
+          sampler_.LowestSole(first + i, moving) + correction.offset_m.y - ground_m;
+      lift_m = std::max(lift_m, (clearance_m - above_m) / LiftShare(lift, samples[i]));
+    }
+    return lift_m;
+  }
+
   const MotionLibrary& library_;
   const Skeleton& skeleton_;
   const LegRig& rig_;
@@ -603,7 +623,8 @@ class Planner {
   // before and one after them, for velocities.
   static constexpr std::size_t kRelease = 1;
   static constexpr std::size_t kLanding = 4;
-  static constexpr std::size_t kSwing = 6;
+  static constexpr std::size_t kEarly = 6;
+  static constexpr std::size_t kSwing = kEarly + kEarlySamples.size();
   // Indices of two times: the start of the movement, and kBlendStepS later.
   static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();
   // The end of the movement, without the difference pose.
@@ -774,7 +795,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
       landing = planner.ChooseLanding(locks, *target, moving);
     }
     planner.BlendSwing(moving, landing, trajectory);
-    if (!plan.keeps_above_ground) trajectory.lift_m[kMiddleLift] = planner.LevelLift(moving);
+    if (!plan.keeps_above_ground) planner.LiftOverLevelGround(moving);
     if (target == nullptr) {
       if (plan.keeps_above_ground) trajectory.lift_m = decision.lift_m;
       trajectory.aside_m = decision.aside_m;
