@@ -34,6 +34,9 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   world->avatar_options.idle_motion =
       is_configured ? configured->second.idle_motion.value_or(config_.idle_motion)
                     : config_.idle_motion;
+  world->avatar_options.stride_variation =
+      is_configured ? configured->second.stride_variation.value_or(config_.stride_variation)
+                    : config_.stride_variation;
   world->interest_cell_m = config_.interest_cell_m;
   world->persistent = is_configured ? configured->second.persistent : config_.persistent;
   const bool has_library = is_configured && !configured->second.library.empty();

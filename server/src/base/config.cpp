@@ -201,6 +201,8 @@ std::vector<ConfigKey> MakeKeys() {
            &Config::foot_planting),
       Flag("idle_motion", "Let standing avatars breathe, sway and shift their weight",
            &Config::idle_motion),
+      Flag("stride_variation", "Let the duration and the pose of steps vary slightly",
+           &Config::stride_variation),
       Number("interest_cell_m", "Cell size in m of the grid that finds the avatars of a region",
              &Config::interest_cell_m, 1.0, 1000.0),
       Flag("allow_insecure",
@@ -409,6 +411,9 @@ std::string PrintConfig(const Config& config) {
     if (!world.terrain.empty()) text += fmt::format("terrain = {}\n", Quoted(world.terrain));
     text += fmt::format("persistent = {}\n", world.persistent);
     if (world.idle_motion) text += fmt::format("idle_motion = {}\n", *world.idle_motion);
+    if (world.stride_variation) {
+      text += fmt::format("stride_variation = {}\n", *world.stride_variation);
+    }
   }
   return text;
 }

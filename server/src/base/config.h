@@ -30,7 +30,8 @@ struct WorldConfig {
   std::string library;      ///< Motion library: "builtin" or a file. Empty: the default library.
   std::string terrain;      ///< A terrain file; empty: flat ground.
   bool persistent = false;  ///< Avatars outlive the session that spawned them.
-  std::optional<bool> idle_motion;  ///< Default: Config::idle_motion.
+  std::optional<bool> idle_motion;       ///< Default: Config::idle_motion.
+  std::optional<bool> stride_variation;  ///< Default: Config::stride_variation.
   bool operator==(const WorldConfig&) const = default;
 };
 
@@ -54,6 +55,7 @@ struct Config {
   /// True: feet stay fixed on the ground between landing and lifting.
   bool foot_planting = true;
   bool idle_motion = true;       ///< True: standing avatars breathe, sway and shift their weight.
+  bool stride_variation = true;  ///< True: equal steps vary slightly, as those of people do.
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
   bool allow_insecure = false;
   /// True: when a client joins a world that the file does not name, the server creates it.

@@ -84,9 +84,11 @@ Status ReadWorld(const toml::table& table, const std::string& name, const std::s
       const auto persistent = node.value_exact<bool>();
       if (!persistent) return Fail(ErrorCode::kInvalidArgument, "expected true or false", where);
       world.persistent = *persistent;
-    } else if (key == "idle_motion") {
-      world.idle_motion = node.value_exact<bool>();
-      if (!world.idle_motion) {
+    } else if (key == "idle_motion" || key == "stride_variation") {
+      std::optional<bool>& value =
+          key == "idle_motion" ? world.idle_motion : world.stride_variation;
+      value = node.value_exact<bool>();
+      if (!value) {
         return Fail(ErrorCode::kInvalidArgument, "expected true or false", where);
       }
     } else {

@@ -130,7 +130,7 @@ PoseStreams PlayAlone(int avatars, PoseMode mode, const PoseStreams& like) {
     const auto number = static_cast<AvatarId>(i);
     const protocol::Placement start = Start(number);
     AvatarSimulation avatar(MakeTestLibrary(), {start.position_m, start.heading_rad},
-                            {.idle_motion = false});
+                            {.idle_motion = false, .stride_variation = true, .seed = number});
     const auto step = [&](double length_m) {
       return MovementRequest{1, StepRequest{.length_m = length_m}};
     };

@@ -81,10 +81,12 @@ TEST(Config, PrintedTextIsReadBackUnchanged) {
   config.run_time_correction = false;
   config.foot_planting = false;
   config.idle_motion = false;
+  config.stride_variation = false;
   config.limits.max_sessions = 3;
   config.limits.idle_timeout_s = 0.0;
   config.worlds["hall"] = {.library = "hall.swl", .terrain = "hall \"1\".json", .persistent = true};
-  config.worlds["a.b-c_1"] = {.library = "", .terrain = "", .idle_motion = true};
+  config.worlds["a.b-c_1"] = {
+      .library = "", .terrain = "", .idle_motion = true, .stride_variation = true};
   const std::string text = PrintConfig(config);
   Config read;
   const Status status = ReadConfigText(text, "printed", read);
@@ -97,6 +99,7 @@ TEST(Config, PrintedTextIsReadBackUnchanged) {
   EXPECT_FALSE(read.run_time_correction);
   EXPECT_FALSE(read.foot_planting);
   EXPECT_FALSE(read.idle_motion);
+  EXPECT_FALSE(read.stride_variation);
   EXPECT_EQ(read.worlds, config.worlds);
   EXPECT_EQ(read.limits.idle_timeout_s, 0.0);
 }
@@ -135,6 +138,8 @@ TEST(Config, FileErrorsContainFileLineAndKey) {
       {"[worlds.hall]\nterrain = true", "f.toml:2: worlds.hall.terrain", "in quotes"},
       {"[worlds.hall]\npersistent = \"yes\"", "f.toml:2: worlds.hall.persistent", "true or false"},
       {"[worlds.hall]\nidle_motion = 1", "f.toml:2: worlds.hall.idle_motion", "true or false"},
+      {"[worlds.hall]\nstride_variation = 1", "f.toml:2: worlds.hall.stride_variation",
+       "true or false"},
       {"[worlds.hall]\nbig = true", "f.toml:2: worlds.hall.big", "unknown key"},
       {"tick_hz = = 3", "f.toml:1", "invalid TOML"},
       {"a\xff = 3", "f.toml:1", "invalid TOML"},

@@ -654,7 +654,11 @@ TEST(WorldDirectory, CountsMembersAndRemovesEmptyWorlds) {
   Config config;
   config.library = "test";
   config.limits.max_worlds = 2;
-  config.worlds["hall"] = {.library = "", .terrain = "", .persistent = true, .idle_motion = false};
+  config.worlds["hall"] = {.library = "",
+                           .terrain = "",
+                           .persistent = true,
+                           .idle_motion = false,
+                           .stride_variation = false};
   Libraries libraries;
   libraries.Add("test", MakeTestLibrary());
   const Terrains terrains;
@@ -664,11 +668,13 @@ TEST(WorldDirectory, CountsMembersAndRemovesEmptyWorlds) {
   EXPECT_TRUE((*hall)->persistent);
   EXPECT_TRUE((*hall)->avatar_options.run_time_correction);
   EXPECT_FALSE((*hall)->avatar_options.idle_motion);
+  EXPECT_FALSE((*hall)->avatar_options.stride_variation);
   EXPECT_EQ(*directory.Join("hall"), *hall);
   const auto other = directory.Join("other");
   ASSERT_TRUE(other);
   EXPECT_FALSE((*other)->persistent);
   EXPECT_TRUE((*other)->avatar_options.idle_motion);
+  EXPECT_TRUE((*other)->avatar_options.stride_variation);
   EXPECT_EQ(directory.Join("third").error().code, StatusCode::kLimitReached);
   EXPECT_EQ(directory.Join("no/name").error().code, StatusCode::kInvalidArgument);
   EXPECT_TRUE(directory.DropEmpty().empty());
