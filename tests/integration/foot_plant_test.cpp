@@ -226,7 +226,9 @@ TEST(FootprintError, ReportsHowFarAStepMissesItsFootprint) {
   const Library library = OpenLibrary("builtin").value();
   const auto step_to = [&](const Footprint& print) {
     const std::vector<MovementRequest> requests = {
-        {1, StepRequest{.foot = Foot::kLeft, .at = {{print.position_m, print.heading_rad}}}}};
+        {1, StepRequest{.foot = Foot::kLeft,
+                        .at = {{print.position_m, print.heading_rad}},
+                        .allow_nearest = true}}};
     return Synthesize({.library = library, .requests = requests, .fps = kFps})
         .value()
         .movements.front();

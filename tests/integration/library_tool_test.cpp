@@ -425,11 +425,11 @@ TEST_F(LibraryTool, SkipsExactStepsOutOfReach) {
   std::vector<std::string> json_arguments = arguments;
   json_arguments.push_back("--json");
   const json output = ParseOutput(Tool(json_arguments).out);
-  ASSERT_EQ(output["unreachable_footprints"].size(), 1u);
-  const json& unreachable = output["unreachable_footprints"][0];
+  ASSERT_EQ(output["skipped"].size(), 1u);
+  const json& unreachable = output["skipped"][0];
   EXPECT_THAT(Keys(unreachable),
               testing::UnorderedElementsAre("request", "reason", "time_s", "nearest", "missed_m",
-                                            "missed_rad"));
+                                            "missed_rad", "requested", "reached"));
   EXPECT_EQ(unreachable["request"], 1);
   EXPECT_NEAR(
       unreachable["nearest"]["at_m"][2].get<double>() + unreachable["missed_m"].get<double>(), 7.0,
@@ -630,7 +630,8 @@ TEST_F(LibraryTool, ShortStepsWithLongStridesAreListed) {
   const std::string choreography =
       folder_.Write("c.json",
                     R"({"movements":[{"step":{"length_m":0.28}},{"step":{"length_m":0.28}},
-                       {"step":{"length_m":0.28}},{"step":{"length_m":1.2}}]})");
+                       {"step":{"length_m":0.28}},
+                       {"step":{"length_m":1.2,"allow_nearest":true}}]})");
   ASSERT_EQ(Tool({"build", "--out", Out(), kJumps}).exit_code, 0);
   const ProgramResult result =
       Tool({"synthesize", Out(), "--choreography", choreography, "--out", Out("o.bvh"), "--json"});
@@ -650,7 +651,9 @@ TEST_F(LibraryTool, ShortStepsWithLongStridesAreListed) {
 
 TEST_F(LibraryTool, SynthesisListsRequestsThatWereNotMet) {
   const std::string choreography = folder_.Write(
-      "c.json", R"({"movements":[{"step":{"length_m":0.5}},{"step":{"length_m":1.5}}]})");
+      "c.json",
+      R"({"movements":[{"step":{"length_m":0.5}},{"step":{"length_m":1.5,"allow_nearest":true}},
+                       {"step":{"length_m":1.5}}]})");
   const Arguments arguments = {"synthesize", "builtin", "--choreography",
                                choreography, "--out",   Out("o.bvh")};
   const ProgramResult text = Tool(arguments);
@@ -658,11 +661,16 @@ TEST_F(LibraryTool, SynthesisListsRequestsThatWereNotMet) {
   EXPECT_THAT(text.out, HasSubstr("movements[1] missed its request"));
   EXPECT_THAT(text.out, Not(HasSubstr("movements[0]")));
   const json refusals = ParseOutput(Tool(Join(arguments, {"--json"})).out)["refusals"];
-  ASSERT_EQ(refusals.size(), 1u);
+  ASSERT_EQ(refusals.size(), 2u);
   EXPECT_EQ(refusals[0]["request"], 1);
   EXPECT_EQ(refusals[0]["asked"]["length_m"], 1.5);
   EXPECT_LT(refusals[0]["got"]["length_m"], 1.0);
   EXPECT_THAT(text.out, HasSubstr(refusals[0]["reason"].get<std::string>()));
+  EXPECT_EQ(refusals[1]["request"], 2);
+  EXPECT_EQ(refusals[1]["asked"]["length_m"], 1.5);
+  EXPECT_NEAR(refusals[1]["got"]["length_m"], refusals[0]["got"]["length_m"], 0.1);
+  EXPECT_THAT(text.out,
+              HasSubstr("movements[2] was skipped: the step is out of reach: requested length"));
 }
 
 TEST_F(LibraryTool, BuildReportsTheFateOfEveryExample) {
@@ -883,7 +891,8 @@ TEST_F(LibraryTool, ReportsTheGroupOfEachStepAndExtrapolation) {
   EXPECT_TRUE(has(aside, "end_x_m"));
   EXPECT_FALSE(has(aside, "end_y_m"));
 
-  const json far = play(R"({"foot":"left","length_m":3})");
+  EXPECT_TRUE(play(R"({"foot":"left","length_m":3})").is_null());
+  const json far = play(R"({"foot":"left","length_m":3,"allow_nearest":true})");
   EXPECT_TRUE(far["extrapolated"]);
   EXPECT_TRUE(far["clamped"]);
   EXPECT_NEAR(far["requested"]["end_z_m"], 3.0, 1e-9);

@@ -346,11 +346,11 @@ TEST_P(TransitionSmoothness, IsThatOfTheMovementsThemselves) {
         MovementRequest request{++id, StandRequest{0.3}};
         const double what = random.Draw(0.0, 1.0);
         if (what < 0.55) {
-          StepRequest step{.length_m = random.Draw(0.0, 0.7)};
+          StepRequest step{.length_m = random.Draw(0.0, 0.7), .allow_nearest = true};
           if (random.Draw(0.0, 1.0) < 0.4) step.foot = what < 0.3 ? Foot::kLeft : Foot::kRight;
           request.movement = step;
         } else if (what < 0.8) {
-          request.movement = JumpRequest{.length_m = random.Draw(0.5, 1.4)};
+          request.movement = JumpRequest{.length_m = random.Draw(0.5, 1.4), .allow_nearest = true};
         }
         ASSERT_TRUE(avatar.Enqueue(request).has_value());
       }

@@ -1,5 +1,6 @@
 // Steps with exact placement: those out of reach are rejected, all others land on their footprint.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +28,10 @@ constexpr double kDegrees = 180.0 / M_PI;
 
 MovementRequest StepOnto(std::uint64_t id, Foot foot, const DVec3& place_m, double heading_rad,
                          bool exact_only = true) {
-  return {id, StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .exact_only = exact_only}};
+  return {id, StepRequest{.foot = foot,
+                          .at = {{place_m, heading_rad}},
+                          .exact_only = exact_only,
+                          .allow_nearest = !exact_only}};
 }
 
 BlendedFoot SeenFoot(const AvatarSimulation& avatar, Foot foot) {
@@ -177,7 +181,8 @@ TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
     if (!seen.is_rejected) {
       ASSERT_TRUE(avatar.Enqueue(StepOnto(id, foot, print.position_m, heading_rad)).has_value());
     } else {
-      ASSERT_TRUE(avatar.Enqueue({id, StepRequest{.foot = foot, .length_m = 0.4}}).has_value());
+      const StepRequest step{.foot = foot, .length_m = 0.4, .allow_nearest = true};
+      ASSERT_TRUE(avatar.Enqueue({id, step}).has_value());
     }
     int ticks = 0;
     while (avatar.started() == nullptr || avatar.started()->request_id != id) {
@@ -350,10 +355,47 @@ TEST_F(ExactPlacement, DoesNotAllocateAndLimitsRejectionsPerTick) {
   EXPECT_GE(ticks, AvatarSimulation::kMaxQueue / AvatarSimulation::kMaxEventsPerAdvance);
 }
 
-TEST_F(ExactPlacement, RequiresAFootprintAndFootPlanting) {
-  const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .exact_only = true}};
-  EXPECT_EQ(avatar_.Enqueue(nowhere).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only requires at_m");
+// Steps by length land exactly where they should, or are rejected.
+TEST_F(ExactPlacement, PlacesStepsByLength) {
+  const std::vector<StepRequest> steps = {
+      {.length_m = 0.5, .exact_only = true},
+      {.length_m = 0.6, .turn_rad = 0.3, .exact_only = true},
+      {.length_m = 0.0, .side_m = 0.3, .exact_only = true},
+      {.length_m = 1.3, .exact_only = true},
+      {.foot = Foot::kLeft, .length_m = 0.4, .side_m = 0.15, .height_m = 0.1, .exact_only = true}};
+  std::vector<MovementRequest> requests;
+  for (const StepRequest& step : steps) requests.push_back({requests.size() + 1, step});
+  const auto played = Synthesize({.library = library_, .requests = requests});
+  ASSERT_TRUE(played.has_value());
+  ASSERT_EQ(played->skipped.size(), 1u);
+  const FootprintError& missed = played->skipped[0].missed;
+  EXPECT_EQ(played->skipped[0].request_id, 4u);
+  EXPECT_DOUBLE_EQ(missed.requested.length_m, 1.3);
+  EXPECT_NEAR(missed.reached.length_m, 1.3 - missed.distance_m, 0.05);
+  EXPECT_THAT(played->skipped[0].reason,
+              testing::StartsWith("the step is out of reach: requested length 1.3 m"));
+  int met = 0;
+  for (const MovementRecord& movement : played->movements) {
+    if (movement.request_id == 0) continue;
+    const StepRequest& step = steps[movement.request_id - 1];
+    const DVec3 fixed = movement.plants[0].anchor_m;
+    const DVec3 landed = movement.plants.back().anchor_m;
+    const DVec3 apart = RotateYaw(-movement.base.heading_rad, landed - fixed);
+    EXPECT_NEAR(apart.z, step.length_m, 1e-3) << movement.request_id;
+    EXPECT_NEAR(apart.y, step.height_m, 1e-3) << movement.request_id;
+    EXPECT_NEAR(std::fabs(apart.x), step.side_m.value_or(std::fabs(apart.x)), 1e-3)
+        << movement.request_id;
+    EXPECT_LE(movement.landing_error_m, 1e-3) << movement.request_id;
+    ++met;
+  }
+  EXPECT_EQ(met, 4);
+}
+
+TEST_F(ExactPlacement, ExcludesTheNearestAndRequiresFootPlanting) {
+  const MovementRequest either{
+      1, StepRequest{.length_m = 0.5, .exact_only = true, .allow_nearest = true}};
+  EXPECT_EQ(avatar_.Enqueue(either).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_STREQ(avatar_.Enqueue(either).error().text, "exact_only excludes allow_nearest");
   AvatarSimulation sliding(library_, BaseFrame{}, {.foot_planting = false});
   const MovementRequest somewhere = StepOnto(1, Foot::kLeft, {0.1, 0.0, 0.4}, 0.0);
   EXPECT_EQ(sliding.Enqueue(somewhere).error().code, ErrorCode::kUnsupported);
@@ -372,10 +414,10 @@ TEST_F(ExactPlacement, SynthesisReportsRejectedSteps) {
       {3, StepRequest{.length_m = 0.5}}};
   const auto synthesis = Synthesize({.library = library_, .requests = requests});
   ASSERT_TRUE(synthesis.has_value());
-  ASSERT_EQ(synthesis->unreachable_footprints.size(), 1u);
-  EXPECT_EQ(synthesis->unreachable_footprints[0].request_id, 2u);
-  EXPECT_GT(synthesis->unreachable_footprints[0].missed.distance_m, 3.0);
-  EXPECT_EQ(synthesis->unreachable_footprints[0].time_s, synthesis->movements[1].start_s);
+  ASSERT_EQ(synthesis->skipped.size(), 1u);
+  EXPECT_EQ(synthesis->skipped[0].request_id, 2u);
+  EXPECT_GT(synthesis->skipped[0].missed.distance_m, 3.0);
+  EXPECT_EQ(synthesis->skipped[0].time_s, synthesis->movements[1].start_s);
   EXPECT_EQ(synthesis->movements[1].request_id, 3u);
   EXPECT_TRUE(synthesis->walks.empty());
 }

@@ -21,15 +21,16 @@ inline BaseFrame DrawBase(Random& random) {
 }
 
 /// A random request of any kind: steps, steps to footprints, walks, jumps and stands. Some
-/// interrupt the current movement, and some cannot be fulfilled.
+/// interrupt the current movement, and some exact footprints are out of reach.
 inline MovementRequest DrawRequest(Random& random, const AvatarSimulation& avatar) {
   MovementRequest request{.id = 1};
   const double kind = random.Draw(0.0, 1.0);
   if (kind < 0.4) {
     request.movement = StepRequest{.length_m = random.Draw(0.0, 0.9),
-                                   .turn_rad = Draws(random, 0.5) ? random.Draw(-0.5, 0.5) : 0.0};
+                                   .turn_rad = Draws(random, 0.5) ? random.Draw(-0.5, 0.5) : 0.0,
+                                   .allow_nearest = true};
   } else if (kind < 0.6) {
-    request.movement = StepRequest{
+    StepRequest step{
         .at =
             FootprintRequest{avatar.base().position_m + RotateYaw(avatar.base().heading_rad,
                                                                   DVec3(random.Draw(-0.4, 0.4), 0.0,
@@ -38,13 +39,15 @@ inline MovementRequest DrawRequest(Random& random, const AvatarSimulation& avata
                                  ? std::optional(avatar.base().heading_rad + random.Draw(-0.5, 0.5))
                                  : std::nullopt},
         .exact_only = Draws(random, 0.5)};
+    step.allow_nearest = !step.exact_only;
+    request.movement = step;
   } else if (kind < 0.8) {
     request.movement =
         WalkRequest{.position_m = avatar.base().position_m +
                                   DVec3(random.Draw(-3.0, 3.0), 0.0, random.Draw(-3.0, 3.0)),
                     .heading_rad = random.Draw(-3.0, 3.0)};
   } else if (kind < 0.9) {
-    request.movement = JumpRequest{.length_m = random.Draw(0.5, 1.0)};
+    request.movement = JumpRequest{.length_m = random.Draw(0.5, 1.0), .allow_nearest = true};
   } else {
     request.movement = StandRequest{Draws(random, 0.3) ? 0.0 : random.Draw(0.0, 0.5)};
   }

@@ -17,6 +17,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+Json MeasuresToJson(const StepMeasures& step) {
+  return {{"length_m", step.length_m},
+          {"side_m", step.side_m},
+          {"height_m", step.height_m},
+          {"turn_rad", step.turn_rad}};
+}
+
 Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
   Json json;
   json["kind"] = MovementKindName(record.kind);
@@ -123,18 +130,20 @@ int RunSynthesize(const SynthesizeCommand& command) {
                                {"end_s", walk.end_s},
                                {"base", BaseToJson(walk.base)}});
     }
-    json["unreachable_footprints"] = Json::array();
-    for (const UnreachableFootprint& unreachable : synthesis->unreachable_footprints) {
-      const Footprint& nearest = unreachable.missed.nearest;
-      json["unreachable_footprints"].push_back(
-          {{"request", unreachable.request_id - 1},
-           {"reason", unreachable.reason},
-           {"time_s", unreachable.time_s},
+    json["skipped"] = Json::array();
+    for (const SkippedRequest& request : synthesis->skipped) {
+      const Footprint& nearest = request.missed.nearest;
+      json["skipped"].push_back(
+          {{"request", request.request_id - 1},
+           {"reason", request.reason},
+           {"time_s", request.time_s},
            {"nearest",
             {{"at_m", {nearest.position_m.x, nearest.position_m.y, nearest.position_m.z}},
              {"heading_rad", nearest.heading_rad}}},
-           {"missed_m", unreachable.missed.distance_m},
-           {"missed_rad", unreachable.missed.turn_rad}});
+           {"requested", MeasuresToJson(request.missed.requested)},
+           {"reached", MeasuresToJson(request.missed.reached)},
+           {"missed_m", request.missed.distance_m},
+           {"missed_rad", request.missed.turn_rad}});
     }
     json["refusals"] = RefusalsToJson(refusals);
     json["stop_reason"] = synthesis->stop_reason;

@@ -90,9 +90,11 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
             step.at = FootprintRequest{movement.at->position_m, movement.at->heading_rad};
           }
           step.exact_only = movement.exact_only;
+          step.allow_nearest = !movement.exact_only;
           request.movement = step;
         } else if constexpr (std::is_same_v<T, protocol::JumpMovement>) {
-          request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad};
+          request.movement =
+              JumpRequest{movement.length_m, movement.height_m, movement.turn_rad, true};
         } else if constexpr (std::is_same_v<T, protocol::WalkMovement>) {
           request.movement = WalkRequest{movement.position_m, movement.heading_rad,
                                          movement.waypoints_m, movement.speed_m_s};

@@ -58,8 +58,8 @@ struct WalkRecord {
   BaseFrame base;  ///< Base frame at the end of the walk.
 };
 
-/// A step that was skipped because it required exact placement and could not reach its footprint.
-struct UnreachableFootprint {
+/// A step or jump that was skipped because it was out of reach.
+struct SkippedRequest {
   std::uint64_t request_id = 0;
   std::string reason;
   double time_s = 0.0;
@@ -82,7 +82,7 @@ struct Synthesis {
   Clip clip;  ///< Poses in world space; frame 0 is the standing pose before the first tick.
   std::vector<MovementRecord> movements;
   std::vector<WalkRecord> walks;
-  std::vector<UnreachableFootprint> unreachable_footprints;
+  std::vector<SkippedRequest> skipped;
   /// Why the feet are apart at the end of the choreography; empty if they are together.
   std::string stop_reason;
 };

@@ -19,17 +19,31 @@ enum class AvatarEventType : std::uint8_t {
   kFootStrike,  ///< A foot touched the ground: which foot, and where its ball is.
   kFinished,    ///< A movement ended: the new base frame.
   kIdle,        ///< The avatar stands still and its queue is empty.
-  /// A request could not be carried out: code and reason. If the request was a step that had to hit
-  /// a footprint exactly, also the nearest footprint in reach. The requests queued after it are
-  /// played.
+  /// A request could not be carried out: code and reason. If a step or jump was out of reach, also
+  /// what would have been nearest to it. The requests queued after it are played.
   kRejected,
 };
 
-/// Distance by which a step would have missed a footprint that it had to hit exactly.
+/// A step or jump in terms of StepRequest or JumpRequest.
+struct StepMeasures {
+  double length_m = 0.0;
+  double side_m = 0.0;  ///< 0 for jumps.
+  double height_m = 0.0;
+  double turn_rad = 0.0;
+};
+
+/// How a rejected step or jump would have missed its request. For steps with `exact_only` the
+/// values are exact, otherwise within a few centimetres.
 struct FootprintError {
-  Footprint nearest;        ///< Nearest footprint in reach.
-  double distance_m = 0.0;  ///< Distance from `nearest` to the requested footprint, >= 0.
-  double turn_rad = 0.0;    ///< Difference between the headings of the two footprints, >= 0.
+  /// Nearest footprint in reach. For a jump: point between the feet and heading after it.
+  Footprint nearest;
+  double distance_m = 0.0;  ///< Distance from `nearest` to the requested place, >= 0.
+  /// Angle between the directions of the paths or between the headings, whichever is larger, >= 0.
+  /// With `exact_only`: between the headings of the footprints.
+  double turn_rad = 0.0;
+  StepMeasures requested;     ///< The request relative to the fixed foot or to the start.
+  StepMeasures reached;       ///< The nearest step or jump.
+  bool is_footprint = false;  ///< The request was a step to a footprint.
 };
 
 /// Something that happened to an avatar during Advance. The type determines which fields are set.
@@ -54,12 +68,14 @@ struct AvatarEvent {
   /// In static storage. kRejected: reason as one sentence. kIdle, and kStarted of a stand: the
   /// reason why the feet are still apart; empty if they are together.
   const char* reason = "";
-  /// kRejected: set only if the request was a step to a footprint.
+  /// kRejected: set if the request was a step or jump that is out of reach.
   std::optional<FootprintError> missed;
 };
 
 /// Describes a kRejected event in one sentence of at most 200 bytes, for example "the footprint is
-/// out of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off".
+/// out of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off",
+/// or "the step is out of reach: requested length 1 m; nearest length 0.66 m, 0.34 m and 0 degrees
+/// off".
 [[nodiscard]] std::string DescribeRejection(const AvatarEvent& event);
 
 /// Methods to continue smoothly from the previously displayed pose when a movement begins.
@@ -117,8 +133,8 @@ class Avatar {
 
   /// Validates and queues a request. A request that interrupts empties the queue first.
   ///
-  /// Errors: those of ValidateRequest; kUnsupported: an exact footprint was requested while feet
-  /// are not planted; kLimitExceeded: the queue holds kMaxQueue requests.
+  /// Errors: those of ValidateRequest; kUnsupported: exact placement was requested while feet are
+  /// not planted; kLimitExceeded: the queue holds kMaxQueue requests.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
   /// Drops the requests that have not started and returns their number.

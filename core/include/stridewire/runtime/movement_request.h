@@ -45,15 +45,20 @@ struct StepRequest {
   double turn_rad = 0.0;  ///< Change of heading; positive turns left.
   /// Footprint of the moving foot in the world. It replaces length, side, height and turn.
   std::optional<FootprintRequest> at;
-  /// Only with `at`. If the footprint is out of reach when the step is about to start, the request
-  /// is rejected. Otherwise the foot lands as close to the footprint as possible.
+  /// If the foot cannot land exactly at its place when the step is about to start, the request is
+  /// rejected. Requires foot planting.
   bool exact_only = false;
+  /// Plays the nearest step of the library, however far it is from the request. Otherwise, errors
+  /// above kMaxRequestErrorM or kMaxRequestErrorRad cause a rejection.
+  bool allow_nearest = false;
 };
 
 struct JumpRequest {
   double length_m = 0.0;  ///< Forward distance.
   double height_m = 0.0;  ///< Height of the landing place above the start.
   double turn_rad = 0.0;  ///< Change of heading; positive turns left.
+  /// Plays the nearest jump, however far it is from the request, as in StepRequest.
+  bool allow_nearest = false;
 };
 
 /// Requests standing still for `seconds`. A walking avatar first brings its feet together.
@@ -102,6 +107,12 @@ inline constexpr double kMaxLayerBlendS = 10.0;
 inline constexpr double kMinLayerSpeed = 0.1;
 inline constexpr double kMaxLayerSpeed = 4.0;
 
+/// A step or jump is rejected before it starts if it would miss its place by more than
+/// kMaxRequestErrorM, or its direction or heading by more than kMaxRequestErrorRad. The option
+/// `allow_nearest` of the request permits larger errors.
+inline constexpr double kMaxRequestErrorM = 0.2;
+inline constexpr double kMaxRequestErrorRad = 1.0471975511965976;  ///< 60 degrees.
+
 /// Limits on requests. They only reject nonsense and are far wider than the range of any library.
 inline constexpr double kMaxRequestLengthM = 10.0;  ///< Magnitude of lengths, sides and heights.
 inline constexpr double kMaxRequestTurnRad = 3.2;
@@ -114,8 +125,8 @@ inline constexpr double kMaxWalkSpeedMPerS = 5.0;
 inline constexpr std::size_t kMaxWaypoints = 64;
 
 /// Checks a request. Errors: kOutOfRange if a number is not finite or exceeds its limit;
-/// kInvalidArgument if `exact_only` is set without `at`; kUnsupported if the library has no
-/// movement of the requested kind.
+/// kInvalidArgument if both `exact_only` and `allow_nearest` are set; kUnsupported if the library
+/// has no movement of the requested kind.
 [[nodiscard]] Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request);
 
 /// Values of the parameters of a group, in the order of MotionGroup::parameters.

@@ -76,7 +76,7 @@ Status ReadFlag(const JsonField& field, const char* key, bool& out) {
 
 Status ReadStep(const JsonField& field, StepRequest& step) {
   if (auto ok = CheckKeys(field, {"foot", "length_m", "side_m", "height_m", "turn_rad", "at_m",
-                                  "heading_rad", "exact_only"});
+                                  "heading_rad", "exact_only", "allow_nearest"});
       !ok) {
     return ok;
   }
@@ -89,13 +89,15 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
       return Fail(ErrorCode::kMalformed, "expected \"left\" or \"right\"", field.WhereOf("foot"));
     }
   }
-  if (field.Find("at_m") != nullptr) {
-    if (auto ok = ReadFlag(field, "exact_only", step.exact_only); !ok) return ok;
-    return ReadFootprint(field, step.at.emplace());
+  if (auto ok = ReadFlag(field, "exact_only", step.exact_only); !ok) return ok;
+  if (auto ok = ReadFlag(field, "allow_nearest", step.allow_nearest); !ok) return ok;
+  if (step.exact_only && step.allow_nearest) {
+    return Fail(ErrorCode::kMalformed, "cannot be combined with allow_nearest",
+                field.WhereOf("exact_only"));
   }
-  for (const char* key : {"heading_rad", "exact_only"}) {
-    if (field.Find(key) == nullptr) continue;
-    return Fail(ErrorCode::kMalformed, "requires at_m", field.WhereOf(key));
+  if (field.Find("at_m") != nullptr) return ReadFootprint(field, step.at.emplace());
+  if (field.Find("heading_rad") != nullptr) {
+    return Fail(ErrorCode::kMalformed, "requires at_m", field.WhereOf("heading_rad"));
   }
   if (auto ok = ReadRequiredNumber(field, "length_m", kLength, step.length_m); !ok) return ok;
   if (field.Find("side_m") != nullptr) {
@@ -108,7 +110,10 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
 }
 
 Status ReadJump(const JsonField& field, JumpRequest& jump) {
-  if (auto ok = CheckKeys(field, {"length_m", "height_m", "turn_rad"}); !ok) return ok;
+  if (auto ok = CheckKeys(field, {"length_m", "height_m", "turn_rad", "allow_nearest"}); !ok) {
+    return ok;
+  }
+  if (auto ok = ReadFlag(field, "allow_nearest", jump.allow_nearest); !ok) return ok;
   if (auto ok = ReadRequiredNumber(field, "length_m", kLength, jump.length_m); !ok) return ok;
   if (auto ok = ReadNumber(field, "height_m", kLength, jump.height_m); !ok) return ok;
   return ReadNumber(field, "turn_rad", kTurn, jump.turn_rad);

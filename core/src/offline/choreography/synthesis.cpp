@@ -282,7 +282,7 @@ Expected<Synthesis> Synthesize(const SynthesisInput& input) {
         result.walks.push_back({event.request_id, event.type == AvatarEventType::kFinished,
                                 event.reason, event.time_s, event.base});
       } else if (event.missed) {
-        result.unreachable_footprints.push_back(
+        result.skipped.push_back(
             {event.request_id, DescribeRejection(event), event.time_s, *event.missed});
       } else if (event.type == AvatarEventType::kRejected) {
         return std::unexpected(Rejected(event, requests, layers));

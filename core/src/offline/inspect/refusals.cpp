@@ -6,24 +6,17 @@
 
 #include "offline/base/degrees.h"
 #include "offline/base/text.h"
+#include "runtime/plan/request_error.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 namespace {
 
-// A shorter path has no direction that matters.
-constexpr double kShortestPathM = 0.15;
 // Results within this distance are met, whatever their direction.
 constexpr double kMetM = 0.05;
 
 double Horizontal(const DVec3& v) { return std::hypot(v.x, v.z); }
-
-// Returns the angle between two horizontal directions; 0 if one of them is short.
-double AngleBetween(const DVec3& a, const DVec3& b) {
-  if (Horizontal(a) < kShortestPathM || Horizontal(b) < kMetM) return 0.0;
-  return std::fabs(std::atan2(a.z * b.x - a.x * b.z, a.x * b.x + a.z * b.z));
-}
 
 std::string Place(const DVec3& m) { return Text("(%.2f, %.2f, %.2f) m", m.x, m.y, m.z); }
 
@@ -46,7 +39,7 @@ class RefusalFinder {
       before = record.base;
     }
     for (const WalkRecord& walk : synthesis_.walks) AddWalk(walk);
-    for (const UnreachableFootprint& skipped : synthesis_.unreachable_footprints) {
+    for (const SkippedRequest& skipped : synthesis_.skipped) {
       AddSkipped(skipped);
     }
     std::ranges::stable_sort(refusals_, {}, &Refusal::request_id);
@@ -105,7 +98,7 @@ class RefusalFinder {
     const DVec3 path = fixed + RotateYaw(heading, asked) - start;
     refusal.missed_rad =
         std::max(std::fabs(turned - step.turn_rad),
-                 refusal.missed_m > kMetM ? AngleBetween(path, landed - start) : 0.0);
+                 refusal.missed_m > kMetM ? DirectionError(path, landed - start) : 0.0);
     const char* const foot = moving == Foot::kLeft ? "left" : "right";
     refusal.reason = Text("missed its request: the %s foot should land ", foot) +
                      AheadText(step.length_m) +
@@ -128,7 +121,7 @@ class RefusalFinder {
     refusal.missed_m = Horizontal(landed - asked);
     refusal.missed_rad =
         std::max(std::fabs(WrapAngle(record.base.heading_rad - heading)),
-                 refusal.missed_m > kMetM ? AngleBetween(asked - start, landed - start) : 0.0);
+                 refusal.missed_m > kMetM ? DirectionError(asked - start, landed - start) : 0.0);
     refusal.reason = "missed its request: the foot should land at " + Place(asked) +
                      ", but the nearest step of the library lands at " + Place(landed) + ", " +
                      MissText(refusal);
@@ -150,7 +143,7 @@ class RefusalFinder {
     }
     refusal.missed_m = std::hypot(Horizontal(got - asked), got.y - asked.y);
     refusal.missed_rad = std::max(std::fabs(turned - jump.turn_rad),
-                                  refusal.missed_m > kMetM ? AngleBetween(asked, got) : 0.0);
+                                  refusal.missed_m > kMetM ? DirectionError(asked, got) : 0.0);
     refusal.reason =
         Text(
             "missed its request: the jump should be %.2f m long, but the nearest jump of "
@@ -195,17 +188,31 @@ class RefusalFinder {
     refusals_.push_back(std::move(refusal));
   }
 
-  void AddSkipped(const UnreachableFootprint& skipped) {
+  void AddSkipped(const SkippedRequest& skipped) {
     const auto request =
         std::ranges::find(input_.requests, skipped.request_id, &MovementRequest::id);
     if (request == input_.requests.end()) return;
     const auto* step = std::get_if<StepRequest>(&request->movement);
-    if (step == nullptr || !step->at) return;
     const Footprint& nearest = skipped.missed.nearest;
-    const DVec3& asked = step->at->position_m;
-    Refusal refusal{.request_id = skipped.request_id, .kind = "step"};
-    refusal.asked = {{"at_x_m", asked.x}, {"at_z_m", asked.z}};
-    refusal.got = {{"at_x_m", nearest.position_m.x}, {"at_z_m", nearest.position_m.z}};
+    Refusal refusal{.request_id = skipped.request_id, .kind = step != nullptr ? "step" : "jump"};
+    if (step != nullptr && step->at) {
+      const DVec3& asked = step->at->position_m;
+      refusal.asked = {{"at_x_m", asked.x}, {"at_z_m", asked.z}};
+      refusal.got = {{"at_x_m", nearest.position_m.x}, {"at_z_m", nearest.position_m.z}};
+    } else {
+      const StepMeasures& asked = skipped.missed.requested;
+      const StepMeasures& got = skipped.missed.reached;
+      refusal.asked = {{"length_m", asked.length_m}, {"turn_rad", asked.turn_rad}};
+      refusal.got = {{"length_m", got.length_m}, {"turn_rad", got.turn_rad}};
+      if (step != nullptr && step->side_m) {
+        refusal.asked.emplace_back("side_m", asked.side_m);
+        refusal.got.emplace_back("side_m", got.side_m);
+      }
+      if (input_.options.terrain == nullptr) {
+        refusal.asked.emplace_back("height_m", asked.height_m);
+        refusal.got.emplace_back("height_m", got.height_m);
+      }
+    }
     refusal.missed_m = skipped.missed.distance_m;
     refusal.missed_rad = skipped.missed.turn_rad;
     refusal.reason = "was skipped: " + skipped.reason;
@@ -218,7 +225,7 @@ class RefusalFinder {
   }
 
   void AddIfMissed(Refusal refusal) {
-    if (refusal.missed_m <= kMaxMissM && refusal.missed_rad <= kMaxMissRad) return;
+    if (refusal.missed_m <= kMaxRequestErrorM && refusal.missed_rad <= kMaxRequestErrorRad) return;
     refusals_.push_back(std::move(refusal));
   }
 

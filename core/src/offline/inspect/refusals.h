@@ -25,13 +25,9 @@ struct Refusal {
   std::string reason;
 };
 
-/// Results that differ more from their request than this are listed.
-inline constexpr double kMaxMissM = 0.2;
-inline constexpr double kMaxMissRad = 1.0471975511965976;  ///< 60 degrees.
-
 /// Compares the movements of a synthesis with the requests in `input`. Lists each step, jump and
-/// stand whose result misses the request by more than kMaxMissM or kMaxMissRad, walks that did not
-/// arrive, and skipped steps. Ordered by request.
+/// stand that misses the request by more than kMaxRequestErrorM or kMaxRequestErrorRad, walks that
+/// did not arrive, and skipped steps and jumps. Ordered by request.
 ///
 /// - Steps: position of the moving foot relative to the fixed foot in the heading after the step,
 ///   direction of the path of the moving foot, and change of heading. With `at`, the footprint.

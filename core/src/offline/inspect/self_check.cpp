@@ -104,7 +104,8 @@ class Checker {
 
   void PlaySteps() {
     for (std::uint64_t id = 1; id <= kSteps; ++id) {
-      step_requests_.push_back({.id = id, .movement = StepRequest{.length_m = steps_m_}});
+      step_requests_.push_back(
+          {.id = id, .movement = StepRequest{.length_m = steps_m_, .allow_nearest = true}});
     }
     step_requests_.push_back({.id = kSteps + 1, .movement = StandRequest{.seconds = kStandS}});
     if (!has_steps()) return;
@@ -121,7 +122,7 @@ class Checker {
   }
 
   void CheckThreeSteps() {
-    CheckResult& check = Add("three_steps", "Three plain steps", kMaxMissM, "m");
+    CheckResult& check = Add("three_steps", "Three plain steps", kMaxRequestErrorM, "m");
     if (SkipWithoutSteps(check)) return;
     if (!steps_) {
       Fail(check, Text("Three steps of %.2f m are not possible: ", steps_m_) + steps_error_ + ".",
@@ -291,7 +292,8 @@ class Checker {
   void PlayJump() {
     if (legs_.feet > 0 || !summary_.jumps.is_available()) return;
     const double length_m = 0.5 * (summary_.jumps.range.min + summary_.jumps.range.max);
-    const MovementRequest jump{.id = 1, .movement = JumpRequest{.length_m = length_m}};
+    const MovementRequest jump{
+        .id = 1, .movement = JumpRequest{.length_m = length_m, .allow_nearest = true}};
     const auto played = Synthesize(
         {.library = library_, .start = {}, .requests = std::span(&jump, 1), .fps = kFps});
     if (played) SurveyLegs(*library_, *played, summary_.has_stand(), legs_);

@@ -1,4 +1,4 @@
-// AvatarSimulation: plans steps with exact placement and rejects those that would land elsewhere.
+// AvatarSimulation: rejects steps and jumps that are out of reach, and plans exact placement.
 
 #include <algorithm>
 #include <cmath>
@@ -35,13 +35,43 @@ bool IsMet(const FootprintError& missed) {
   return missed.distance_m <= kMetM && missed.turn_rad <= kMetRad;
 }
 
+StepMeasures MeasuresOf(const RequestTarget& target, double outward) {
+  return {target.vector_m.z, outward * target.vector_m.x, target.vector_m.y, target.turn_rad};
+}
+
+// Returns the length of a step, and its other measures that differ from those requested.
+std::string MeasuresText(const StepMeasures& step, const FootprintError& missed) {
+  constexpr double kVisible = 0.005;
+  std::string text;
+  const auto append = [&](const char* format, double value) {
+    char part[40];
+    // Adding 0 turns a rounded -0.0 into 0.
+    std::snprintf(part, sizeof part, format, std::round(value * 100.0) / 100.0 + 0.0);
+    text += part;
+  };
+  const auto differs = [&](double StepMeasures::* value) {
+    return std::fabs(missed.requested.*value - missed.reached.*value) > kVisible;
+  };
+  append("length %.4g m", step.length_m);
+  if (differs(&StepMeasures::side_m)) append(", side %.4g m", step.side_m);
+  if (differs(&StepMeasures::height_m)) append(", height %.4g m", step.height_m);
+  if (differs(&StepMeasures::turn_rad)) append(", turn %.4g rad", step.turn_rad);
+  return text;
+}
+
 }  // namespace
 
 std::string DescribeRejection(const AvatarEvent& event) {
   if (!event.missed) return event.reason;
   const FootprintError& missed = *event.missed;
-  const DVec3 nearest = missed.nearest.position_m;
   char text[201];
+  if (!missed.is_footprint) {
+    std::snprintf(text, sizeof text, ", %.3g m and %.0f degrees off", missed.distance_m,
+                  missed.turn_rad * kDegreesPerRadian);
+    return event.reason + (": requested " + MeasuresText(missed.requested, missed)) + "; nearest " +
+           MeasuresText(missed.reached, missed) + text;
+  }
+  const DVec3 nearest = missed.nearest.position_m;
   std::snprintf(text, sizeof text,
                 "%s: the %s foot reaches (%.6g, %.6g, %.6g) m heading %.4g rad, %.3g m and %.3g "
                 "degrees off",
@@ -51,12 +81,51 @@ std::string DescribeRejection(const AvatarEvent& event) {
   return text;
 }
 
-// Plans the movement of a request. If the request needs exact placement and would miss its
-// footprint, rejects it, restores the previous state and returns false.
+// Adds the event that rejects a request whose plan is out of reach.
+void AvatarSimulation::RejectOutOfReach(const MovementRequest& request, const RequestPlan& plan) {
+  const MovementKind kind = body_.library->group(plan.group).kind;
+  const auto* step = std::get_if<StepRequest>(&request.movement);
+  const RequestError error = PlannedError(plan);
+  const Foot foot = IsStep(kind) ? MovingFoot(kind) : Foot::kLeft;
+  const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+  // The path of a step begins at the fixed foot, in the heading after the step.
+  const DVec3 from_m = IsStep(kind) ? StandingPosition(OtherFoot(foot)) : base_.position_m;
+  const double heading_rad = base_.heading_rad + (IsStep(kind) ? error.reached.turn_rad : 0.0);
+  FootprintError missed{.nearest = {from_m + RotateYaw(heading_rad, error.reached.vector_m),
+                                    base_.heading_rad + error.reached.turn_rad},
+                        .distance_m = error.distance_m,
+                        .turn_rad = error.angle_rad,
+                        .requested = MeasuresOf(plan.target, outward),
+                        .reached = MeasuresOf(error.reached, outward),
+                        .is_footprint = step != nullptr && step->at.has_value()};
+  if (!plan.is_side_given) missed.requested.side_m = missed.reached.side_m;
+  if (options_.terrain != nullptr) {
+    missed.requested.height_m = missed.reached.height_m;
+    DVec3& nearest_m = missed.nearest.position_m;
+    nearest_m.y = options_.terrain->HeightAt(nearest_m.x, nearest_m.z);
+  }
+  AddEvent({.type = AvatarEventType::kRejected,
+            .request_id = request.id,
+            .kind = kind,
+            .foot = foot,
+            .base = base_,
+            .code = ErrorCode::kOutOfRange,
+            .reason = !IsStep(kind)         ? "the jump is out of reach"
+                      : missed.is_footprint ? "the footprint is out of reach"
+                                            : "the step is out of reach",
+            .missed = missed});
+}
+
+// Plans the movement of a request. If the request is out of reach, rejects it, restores the
+// previous state and returns false.
 bool AvatarSimulation::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
                                      double start_phase, PlanScratch& scratch) {
   const auto* step = std::get_if<StepRequest>(&request.movement);
   if (step == nullptr || !step->exact_only) {
+    if (!AllowsNearest(request) && PlannedError(plan).IsTooLarge()) {
+      RejectOutOfReach(request, plan);
+      return false;
+    }
     PlanMovement(plan, start_phase, scratch);
     return true;
   }
@@ -74,14 +143,24 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   FootprintError missed = LandingErrorFrom(*plan.exact);
   if (IsMet(missed)) return true;
   missed = NearestInReach(*plan.exact, missed, start_phase, scratch);
-  AddEvent({.type = AvatarEventType::kRejected,
-            .request_id = request.id,
-            .kind = group().kind,
-            .foot = MovingFoot(group().kind),
-            .base = base_,
-            .code = ErrorCode::kOutOfRange,
-            .reason = "the footprint is out of reach",
-            .missed = missed});
+  const Foot foot = MovingFoot(group().kind);
+  const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+  missed.requested = MeasuresOf(plan.target, outward);
+  missed.reached =
+      MeasuresOf({RotateYaw(-missed.nearest.heading_rad,
+                            missed.nearest.position_m - StandingPosition(OtherFoot(foot))),
+                  missed.nearest.heading_rad - base_.heading_rad},
+                 outward);
+  missed.is_footprint = step->at.has_value();
+  AddEvent(
+      {.type = AvatarEventType::kRejected,
+       .request_id = request.id,
+       .kind = group().kind,
+       .foot = foot,
+       .base = base_,
+       .code = ErrorCode::kOutOfRange,
+       .reason = missed.is_footprint ? "the footprint is out of reach" : "the step is out of reach",
+       .missed = missed});
   std::swap(body_.movement, saved_.front().movement);
   body_.pose = saved_.front().pose;
   return false;

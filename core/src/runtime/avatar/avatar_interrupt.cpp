@@ -18,6 +18,11 @@ constexpr double kMaxSwingBackM = 0.06;
 // A foot that has to land early lands this far ahead of where it is, in metres.
 constexpr double kEarlyLandingM = 0.12;
 
+// Returns the request of a step that another request needs. Its plan is never out of reach.
+MovementRequest PlannedStep(std::uint64_t id) {
+  return {.id = id, .movement = StepRequest{.allow_nearest = true}};
+}
+
 // Returns the share of its path that a swinging foot has covered, roughly.
 double SwingShare(double phase) {
   const double part = std::clamp(phase - 1.0, 0.0, 1.0);
@@ -91,7 +96,8 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanEarlyLanding(
   if ((1.0 - share) * length_m < kEarlyLandingM) return std::nullopt;
   const StepRequest step{
       .foot = moving,
-      .at = FootprintRequest{swing.from.position_m + share * path, swing.to.heading_rad}};
+      .at = FootprintRequest{swing.from.position_m + share * path, swing.to.heading_rad},
+      .allow_nearest = true};
   auto plan = PlanRequest({.movement = step});
   if (!plan) return std::nullopt;
   return Redirection{*plan, {.movement = step}, true, false};
@@ -125,12 +131,12 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(d
       return std::nullopt;
     }
     walk_ = progress;
-    redirection = Redirection{decision.plan, {.id = request.id}};
+    redirection = Redirection{decision.plan, PlannedStep(request.id)};
   } else {
     if (inserted_steps_ > 0 || !LandsWithFeetApart()) return std::nullopt;
     if (auto plan = PlanPlantedClosingStep(moving); plan && IsAheadOfSwing(*plan->exact, phase)) {
-      redirection =
-          Redirection{*plan, {}, true, std::holds_alternative<StandRequest>(request.movement)};
+      redirection = Redirection{*plan, PlannedStep(0), true,
+                                std::holds_alternative<StandRequest>(request.movement)};
     } else {
       redirection = PlanEarlyLanding(phase);
     }

@@ -7,6 +7,7 @@
 #include "base/check.h"
 #include "base/prefetch.h"
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/library/locomotion_profile.h"
 #include "runtime/movement/stride_variation.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/foot_vector.h"
@@ -339,8 +340,9 @@ void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
-  TransitionPath path = FindTransitionPath(*body_.library, request, direct,
-                                           {feet_, last_moved_, last_group_, inserted_steps_});
+  TransitionPath path =
+      FindTransitionPath(*body_.library, request, direct,
+                         {feet_, last_moved_, last_group_, inserted_steps_, landing_conditions()});
   if (path.is_inserted) {
     if (is_hurried) path.plan->max_rate = kHurriedRate;
     StartInserted(*path.plan, scratch);
@@ -354,6 +356,10 @@ void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch
             ? kJumpStartPhase
             : 0.0;
     if (PlanRequested(taken, *path.plan, start_phase, scratch)) BeginMovement(*path.plan, taken.id);
+  } else if (!AllowsNearest(request) && PlannedError(*direct).IsTooLarge()) {
+    const MovementRequest taken = request;
+    PopQueue();
+    RejectOutOfReach(taken, *direct);
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
@@ -436,6 +442,19 @@ double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   return GroundRise(options_.terrain->HeightAt(planted.x, planted.z) - stands.y);
 }
 
+// Returns the footprint that a step by length requests. Without a side, the feet end as far apart
+// as in a walk or, if they end side by side, as in the stand pose.
+FootprintRequest AvatarSimulation::FootprintOf(const StepRequest& step) const {
+  STRIDEWIRE_CHECK(step.foot.has_value());
+  const LocomotionProfile& profile = body_.library->locomotion_profile();
+  const double outward = *step.foot == Foot::kLeft ? 1.0 : -1.0;
+  const double side_m = step.side_m.value_or(
+      std::fabs(step.length_m) > kFeetApartForwardM ? profile.width_m : profile.stand_m);
+  const double heading_rad = base_.heading_rad + step.turn_rad;
+  const DVec3 vector(outward * side_m, step.height_m, step.length_m);
+  return {StandingPosition(OtherFoot(*step.foot)) + RotateYaw(heading_rad, vector), heading_rad};
+}
+
 std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& request) const {
   if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
     return PlanJump(*body_.library, *jump);
@@ -443,7 +462,10 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   StepRequest step = std::get<StepRequest>(request.movement);
   if (!step.at) {
     if (options_.terrain != nullptr && body_.plants_feet) step.height_m = RiseAhead(step);
-    return PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
+    const auto plan = PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
+    if (!plan || !step.exact_only || !body_.plants_feet) return plan;
+    step.foot = MovingFoot(body_.library->group(plan->group).kind);
+    step.at = FootprintOf(step);
   }
 
   // A step to a footprint is planned relative to the foot that stays.

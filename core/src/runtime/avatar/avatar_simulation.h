@@ -12,6 +12,7 @@
 #include "base/prefetch.h"
 #include "runtime/avatar/avatar_body.h"
 #include "runtime/movement/movement.h"
+#include "runtime/plan/request_error.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/plan/transition_path.h"
 #include "runtime/plan/walk_planner.h"
@@ -212,12 +213,20 @@ class AvatarSimulation {
   void StartInserted(const RequestPlan& plan, PlanScratch& scratch);
   std::uint64_t PopQueue();
   [[nodiscard]] double RiseAhead(const StepRequest& step) const;
+  [[nodiscard]] FootprintRequest FootprintOf(const StepRequest& step) const;
   [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
   void StartPlan(const RequestPlan& plan, std::uint64_t request_id, PlanScratch& scratch);
   void PlanMovement(const RequestPlan& plan, double start_phase, PlanScratch& scratch);
   void BeginMovement(const RequestPlan& plan, std::uint64_t request_id);
   [[nodiscard]] bool PlanRequested(const MovementRequest& request, const RequestPlan& plan,
                                    double start_phase, PlanScratch& scratch);
+  [[nodiscard]] LandingConditions landing_conditions() const {
+    return {body_.plants_feet, options_.terrain != nullptr};
+  }
+  [[nodiscard]] RequestError PlannedError(const RequestPlan& plan) const {
+    return ErrorOf(*body_.library, plan, feet_, landing_conditions());
+  }
+  void RejectOutOfReach(const MovementRequest& request, const RequestPlan& plan);
   [[nodiscard]] FootprintError NearestInReach(const Footprint& asked, const FootprintError& missed,
                                               double start_phase, PlanScratch& scratch);
   [[nodiscard]] FootprintError LandingErrorFrom(const Footprint& asked);

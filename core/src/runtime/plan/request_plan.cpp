@@ -245,6 +245,9 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
     if (plan) {
       plan->is_side_given = request.side_m.has_value();
       plan->turn_rad = request.turn_rad;
+      plan->target = {.vector_m = {request.side_m ? outward * *request.side_m : start.x,
+                                   request.height_m, request.length_m},
+                      .turn_rad = request.turn_rad};
     }
     return plan;
   };
@@ -279,8 +282,31 @@ std::optional<RequestPlan> PlanJump(const MotionLibrary& library, const JumpRequ
   At(goals, ParameterName::kLength) = {request.length_m, true, 1.0};
   At(goals, ParameterName::kHeight) = {request.height_m, true, 1.0};
   At(goals, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
-  return BestPlan(library, MovementKind::kJump, goals, 0.0,
-                  request.turn_rad == 0.0 && request.height_m == 0.0);
+  auto plan = BestPlan(library, MovementKind::kJump, goals, 0.0,
+                       request.turn_rad == 0.0 && request.height_m == 0.0);
+  if (plan) {
+    plan->target = {.vector_m = {0.0, request.height_m, request.length_m},
+                    .turn_rad = request.turn_rad};
+  }
+  return plan;
+}
+
+double NaturalTurn(const MotionGroup& group, const ParameterValues& values) {
+  const int turn = group.FindParameter(ParameterName::kTurn);
+  if (turn >= 0) return values.values[static_cast<std::size_t>(turn)];
+  double sum_rad = 0.0;
+  double weights = 0.0;
+  for (int s = 0; s < group.example_count; ++s) {
+    const auto site = group.site(s);
+    double squared = 1e-6;  // So that the weight of an example at this place is finite.
+    for (std::size_t l = 0; l < site.size(); ++l) {
+      const double away = (values.values[l] - site[l]) / group.parameters[l].scale;
+      squared += away * away;
+    }
+    weights += 1.0 / squared;
+    sum_rad += group.heading_change_rad[static_cast<std::size_t>(s)] / squared;
+  }
+  return sum_rad / weights;
 }
 
 Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request) {
@@ -315,8 +341,8 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
       return Fail(ErrorCode::kOutOfRange, "heading_rad: expected a number within 10000 rad",
                   "step");
     }
-    if (step->exact_only && !step->at) {
-      return Fail(ErrorCode::kInvalidArgument, "exact_only requires at_m", "step");
+    if (step->exact_only && step->allow_nearest) {
+      return Fail(ErrorCode::kInvalidArgument, "exact_only excludes allow_nearest", "step");
     }
     const bool found =
         step->foot ? has_kind(StepKind(*step->foot))

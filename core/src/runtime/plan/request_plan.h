@@ -19,10 +19,19 @@ struct FootState {
   }
 };
 
+/// What a step or jump should reach.
+struct RequestTarget {
+  /// Steps: vector from the fixed to the moving foot at the end, in the heading after the step.
+  /// Jumps: path of the base frame, in the heading before the jump.
+  DVec3 vector_m = DVec3(0.0);
+  double turn_rad = 0.0;  ///< Change of heading.
+};
+
 /// A request translated to a group of the library and parameters of that group.
 struct RequestPlan {
   int group = -1;
   ParameterValues requested;  ///< Parameters of the group that correspond to the request.
+  RequestTarget target;       ///< Without a requested side, `vector_m.x` is that of the feet now.
   /// The point in the hull of the examples, grown by 10 %, that is nearest to `requested`.
   ParameterValues applied;
   bool extrapolated = false;       ///< True if `applied` is outside the hull itself.
@@ -79,5 +88,10 @@ inline constexpr double kHurriedRate = 1.6;
 /// Plans a jump.
 [[nodiscard]] std::optional<RequestPlan> PlanJump(const MotionLibrary& library,
                                                   const JumpRequest& request);
+
+/// Returns the change of heading that a movement of a group produces without an extra turn. Groups
+/// without a turn parameter turn by what their examples turn on average, weighted by the distance
+/// from them.
+[[nodiscard]] double NaturalTurn(const MotionGroup& group, const ParameterValues& values);
 
 }  // namespace stridewire

@@ -33,7 +33,8 @@ class TransitionPathFinder {
       : library_(library),
         stand_{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)},
         step_(std::get_if<StepRequest>(&request.movement)),
-        jump_(std::get_if<JumpRequest>(&request.movement)) {}
+        jump_(std::get_if<JumpRequest>(&request.movement)),
+        allows_nearest_(AllowsNearest(request)) {}
 
   [[nodiscard]] TransitionPath Find(const std::optional<RequestPlan>& direct,
                                     const Stance& stance) const {
@@ -45,7 +46,9 @@ class TransitionPathFinder {
     if (can_start && !StartsWithFeetApart(*direct, stance)) return without_insertion;
     // If the request can begin now, one inserted step may improve it. If it cannot, insert as many
     // steps as it needs.
-    const double max_cost_m = can_start ? MaxCostAfterStepM(CostM(*direct, stance)) : HUGE_VAL;
+    const double max_cost_m = can_start && IsInReach(*direct, stance)
+                                  ? MaxCostAfterStepM(CostM(*direct, stance))
+                                  : HUGE_VAL;
     const int max_steps =
         std::min(can_start ? 1 : kMaxInsertedSteps, kMaxInsertedSteps - stance.inserted_steps);
     for (int steps = 1; steps <= max_steps; ++steps) {
@@ -63,7 +66,7 @@ class TransitionPathFinder {
       auto step =
           PlanStep(library_, StepRequest{.foot = foot}, stance.feet, stance.last_moved, false);
       if (!step || !CanStart(*step, stance)) continue;
-      const Stance after = After(*step, foot);
+      const Stance after = After(stance, *step, foot);
       if (steps > 1 ? FindFirstStep(steps - 1, after, max_cost_m).has_value()
                     : IsPossibleAfter(after, max_cost_m)) {
         return step;
@@ -76,10 +79,11 @@ class TransitionPathFinder {
     const auto plan = jump_ != nullptr
                           ? PlanJump(library_, *jump_)
                           : PlanStep(library_, *step_, stance.feet, stance.last_moved, false);
-    return plan && CanStart(*plan, stance) && CostM(*plan, stance) <= max_cost_m;
+    return plan && CanStart(*plan, stance) && CostM(*plan, stance) <= max_cost_m &&
+           IsInReach(*plan, stance);
   }
 
-  Stance After(const RequestPlan& step, Foot foot) const {
+  Stance After(const Stance& stance, const RequestPlan& step, Foot foot) const {
     const MotionGroup& group = library_.group(step.group);
     const auto end_or = [&](ParameterName name, double fallback) {
       const int l = group.FindParameter(name);
@@ -87,7 +91,15 @@ class TransitionPathFinder {
     };
     const DVec3 vector(end_or(ParameterName::kEndX, stand_.Vector(foot).x),
                        end_or(ParameterName::kEndY, 0.0), end_or(ParameterName::kEndZ, 0.0));
-    return {{foot == Foot::kLeft ? vector : -vector}, foot, static_cast<std::size_t>(step.group)};
+    Stance after = stance;
+    after.feet = {foot == Foot::kLeft ? vector : -vector};
+    after.last_moved = foot;
+    after.group = static_cast<std::size_t>(step.group);
+    return after;
+  }
+
+  bool IsInReach(const RequestPlan& plan, const Stance& stance) const {
+    return allows_nearest_ || !ErrorOf(library_, plan, stance.feet, stance.conditions).IsTooLarge();
   }
 
   bool CanStart(const RequestPlan& plan, const Stance& stance) const {
@@ -140,9 +152,16 @@ class TransitionPathFinder {
   FootState stand_;
   const StepRequest* step_;
   const JumpRequest* jump_;
+  bool allows_nearest_;
 };
 
 }  // namespace
+
+bool AllowsNearest(const MovementRequest& request) {
+  const auto* step = std::get_if<StepRequest>(&request.movement);
+  const auto* jump = std::get_if<JumpRequest>(&request.movement);
+  return step != nullptr ? step->allow_nearest : jump != nullptr && jump->allow_nearest;
+}
 
 bool AreFeetApart(const FootState& feet, const FootState& stand) {
   const DVec3 apart = feet.left_from_right_m - stand.left_from_right_m;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "runtime/plan/request_error.h"
 #include "runtime/plan/request_plan.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
@@ -18,6 +19,9 @@ inline constexpr int kMaxInsertedSteps = 3;
 /// that bring the feet together sideways.
 [[nodiscard]] bool AreFeetApart(const FootState& feet, const FootState& stand);
 
+/// Returns true if the request is a step or jump with `allow_nearest`.
+[[nodiscard]] bool AllowsNearest(const MovementRequest& request);
+
 /// The state from which a movement starts.
 struct Stance {
   FootState feet;
@@ -25,6 +29,7 @@ struct Stance {
   /// Group of the previous movement, or the number of groups after a stand.
   std::size_t group = 0;
   int inserted_steps = 0;  ///< Number of steps inserted so far.
+  LandingConditions conditions;
 };
 
 /// The next movement on the path to a requested step or jump: the request itself, or a step to
@@ -45,6 +50,8 @@ struct TransitionPath {
 ///   examples. Then a step is inserted only if it brings the feet closer together by 3 cm or
 ///   reduces the cost of the request by 0.25 m.
 /// - Steps to footprints are never preceded by inserted steps.
+/// - No step is inserted if the request would still be out of reach after it (RequestError). The
+///   plan of a request that begins at once may be out of reach.
 ///
 /// Breadth-first search with at most 14 calls of PlanStep and 14 more for the request. Never
 /// allocates.

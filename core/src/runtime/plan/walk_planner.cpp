@@ -120,26 +120,6 @@ constexpr double kGoalInSightM = 1.5;
 // A walk makes progress if its remaining effort shrinks by this much.
 constexpr double kProgressM = 0.02;
 
-// Returns the change of heading that a group's step produces without an extra turn. Groups without
-// a turn parameter turn by what their examples turn on average, weighted by the distance from them.
-double NaturalTurn(const MotionGroup& group, const ParameterValues& values) {
-  const int turn = group.FindParameter(ParameterName::kTurn);
-  if (turn >= 0) return values.values[static_cast<std::size_t>(turn)];
-  double sum_rad = 0.0;
-  double weights = 0.0;
-  for (int s = 0; s < group.example_count; ++s) {
-    const auto site = group.site(s);
-    double squared = 1e-6;  // So that the weight of an example at this place is finite.
-    for (std::size_t l = 0; l < site.size(); ++l) {
-      const double away = (values.values[l] - site[l]) / group.parameters[l].scale;
-      squared += away * away;
-    }
-    weights += 1.0 / squared;
-    sum_rad += group.heading_change_rad[static_cast<std::size_t>(s)] / squared;
-  }
-  return sum_rad / weights;
-}
-
 // A step that the library has, and where it leads.
 struct PlannedStep {
   RequestPlan plan;

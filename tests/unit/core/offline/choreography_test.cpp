@@ -123,6 +123,20 @@ TEST(ParseChoreography, ReadsFootprints) {
   EXPECT_TRUE(second.exact_only);
 }
 
+TEST(ParseChoreography, ReadsHowFarMovementsMayMiss) {
+  const Expected<Choreography> read = ParseChoreography(
+      R"({"movements":[{"step":{"length_m":1,"exact_only":true}},
+                       {"step":{"at_m":[0,0,9],"allow_nearest":true}},
+                       {"jump":{"length_m":2,"allow_nearest":true}}, {"jump":{"length_m":2}}]})",
+      "c.json");
+  ASSERT_TRUE(read.has_value()) << Describe(read.error());
+  EXPECT_TRUE(std::get<StepRequest>(read->movements[0].movement).exact_only);
+  EXPECT_FALSE(std::get<StepRequest>(read->movements[0].movement).allow_nearest);
+  EXPECT_TRUE(std::get<StepRequest>(read->movements[1].movement).allow_nearest);
+  EXPECT_TRUE(std::get<JumpRequest>(read->movements[2].movement).allow_nearest);
+  EXPECT_FALSE(std::get<JumpRequest>(read->movements[3].movement).allow_nearest);
+}
+
 TEST(ParseChoreography, ReadsWalks) {
   const Expected<Choreography> read = ParseChoreography(
       R"({"movements":[{"walk_to":{"position_m":[3,0,5],"heading_rad":1.5}},
@@ -232,8 +246,11 @@ const BadText kBadTexts[] = {
      "c.json: movements[0].step.length_m: cannot be combined with at_m"},
     {R"({"movements":[{"step":{"length_m":0.5,"heading_rad":0}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.heading_rad: requires at_m"},
-    {R"({"movements":[{"step":{"length_m":0.5,"exact_only":true}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.exact_only: requires at_m"},
+    {R"({"movements":[{"step":{"length_m":0.5,"exact_only":true,"allow_nearest":true}}]})",
+     ErrorCode::kMalformed,
+     "c.json: movements[0].step.exact_only: cannot be combined with allow_nearest"},
+    {R"({"movements":[{"jump":{"length_m":0.5,"allow_nearest":"yes"}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].jump.allow_nearest: expected true or false"},
     {R"({"movements":[{"step":{"at_m":[0,0,1],"exact_only":1}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.exact_only: expected true or false"},
     {R"({"movements":[{"step":{"foot":"both","length_m":0.5}}]})", ErrorCode::kMalformed,

@@ -135,7 +135,7 @@ TEST_F(AvatarTest, CarriesRemainingTimeToTheNextMovement) {
 }
 
 TEST_F(AvatarTest, ReportsClampedAndExtrapolatedRequests) {
-  Request(StepRequest{.length_m = 5.0});
+  Request(StepRequest{.length_m = 5.0, .allow_nearest = true});
   const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
   EXPECT_TRUE(started[0].clamped);
   EXPECT_TRUE(started[0].extrapolated);
@@ -143,8 +143,55 @@ TEST_F(AvatarTest, ReportsClampedAndExtrapolatedRequests) {
   EXPECT_LT(started[0].applied.values[1], 0.7);
 }
 
+// A request that the library cannot meet is rejected before it plays, and the next one is played.
+TEST_F(AvatarTest, RejectsRequestsOutOfReach) {
+  Request(StepRequest{.length_m = 5.0});
+  Request(StepRequest{.length_m = -0.5});
+  Request(StepRequest{.length_m = 0.3, .height_m = 0.3});
+  Request(StepRequest{.length_m = 0.3, .turn_rad = 1.5});
+  Request(JumpRequest{.length_m = 4.0});
+  Request(StepRequest{.at = FootprintRequest{DVec3(0.1, 0.0, 3.0), 0.0}});
+  Request(StepRequest{.length_m = 0.4});
+  const auto events = RunUntilIdle();
+  const auto rejected = Of(events, AvatarEventType::kRejected);
+  ASSERT_EQ(rejected.size(), 6u);
+  for (std::size_t i = 0; i < rejected.size(); ++i) {
+    EXPECT_EQ(rejected[i].request_id, i + 1);
+    EXPECT_EQ(rejected[i].code, ErrorCode::kOutOfRange);
+    ASSERT_TRUE(rejected[i].missed.has_value());
+    EXPECT_LE(DescribeRejection(rejected[i]).size(), 200u);
+  }
+  const FootprintError& too_long = *rejected[0].missed;
+  EXPECT_DOUBLE_EQ(too_long.requested.length_m, 5.0);
+  EXPECT_LT(too_long.reached.length_m, 0.7);
+  EXPECT_NEAR(too_long.distance_m, 5.0 - too_long.reached.length_m, 1e-9);
+  EXPECT_EQ(DescribeRejection(rejected[0])
+                .find("the step is out of reach: requested length 5 m; "
+                      "nearest length 0."),
+            0u)
+      << DescribeRejection(rejected[0]);
+  EXPECT_GT(rejected[3].missed->turn_rad, kMaxRequestErrorRad);
+  EXPECT_TRUE(rejected[5].missed->is_footprint);
+  EXPECT_EQ(DescribeRejection(rejected[5]).find("the footprint is out of reach: the left foot"),
+            0u);
+  const auto started = Of(events, AvatarEventType::kStarted);
+  ASSERT_FALSE(started.empty());
+  EXPECT_EQ(started[0].request_id, 7u);
+  EXPECT_NEAR(started[0].time_s, 0.0, 1e-9);
+}
+
+// Inserted steps do not help a request that is out of reach, so the avatar does not move.
+TEST_F(AvatarTest, DoesNotStepForARequestOutOfReach) {
+  Request(StepRequest{.length_m = 0.4});
+  Request(JumpRequest{.length_m = 4.0});
+  const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
+  ASSERT_EQ(started.size(), 2u) << "the step and the one that brings the feet together";
+  EXPECT_EQ(started[0].request_id, 1u);
+  EXPECT_EQ(started[1].request_id, 0u);
+}
+
 TEST_F(AvatarTest, ReportsParametersThatTheLibraryLacks) {
-  Request(StepRequest{.length_m = 0.3, .height_m = 0.2, .turn_rad = 0.5});
+  Request(StepRequest{.length_m = 0.3, .height_m = 0.2, .turn_rad = 0.5, .allow_nearest = true});
   const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
   EXPECT_TRUE(started[0].clamped);
 }

@@ -1,0 +1,38 @@
+#pragma once
+
+#include "runtime/plan/request_plan.h"
+#include "stridewire/base/math.h"
+#include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/movement_request.h"
+
+namespace stridewire {
+
+/// Conditions under which a planned movement lands.
+struct LandingConditions {
+  bool plants_feet = true;   ///< Planting corrects where feet land and how far the body turns.
+  bool has_terrain = false;  ///< The terrain determines the height of the landing place.
+};
+
+/// What a planned step or jump will reach, and how far that is from its request.
+struct RequestError {
+  RequestTarget reached;
+  double distance_m = 0.0;  ///< Distance between the landing places, >= 0.
+  /// Angle between the paths to the landing places or between the headings, whichever is larger,
+  /// >= 0. Paths are compared only if the landing places differ and are not close to the start.
+  double angle_rad = 0.0;
+
+  [[nodiscard]] bool IsTooLarge() const {
+    return distance_m > kMaxRequestErrorM || angle_rad > kMaxRequestErrorRad;
+  }
+};
+
+/// Predicts the result of a plan from its parameters, within a few centimetres. `feet` are the feet
+/// at the start.
+[[nodiscard]] RequestError ErrorOf(const MotionLibrary& library, const RequestPlan& plan,
+                                   const FootState& feet, const LandingConditions& conditions);
+
+/// Returns the angle between two horizontal paths, at most pi. Returns 0 if the requested path is
+/// so short that its direction does not matter, or if `path` ends close to its start.
+[[nodiscard]] double DirectionError(const DVec3& requested, const DVec3& path);
+
+}  // namespace stridewire
