@@ -19,6 +19,9 @@ constexpr double kPlantedMargin = 0.3;
 // compensate for the quantization errors of the joints above it.
 constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
+// Margin of the rotations of standing avatars, who play their loop as it is. It only has to
+// compensate for quantization errors.
+constexpr double kIdleMargin = 0.0022;
 // A joint whose w falls below this may rotate in any direction and uses smallest-three encoding.
 constexpr double kMinBoundedW = 0.4;
 // A joint whose mean rotation is below 9 degrees uses the identity as its reference. That saves the
@@ -34,16 +37,22 @@ constexpr double kMaxOuterErrorRad = 0.004;
 // each axis) and a small allowance for single precision.
 constexpr double kMaxErrorToRootM = 0.001 - 0.0000529 - 0.00002;
 
+// Calls `callback` with each rotation of a joint that occurs in a group.
+template <typename Callback>
+void ForEachRotation(const MotionLibrary& library, const MotionGroup& group, std::size_t joint,
+                     const Callback& callback) {
+  const auto row_floats = static_cast<std::size_t>(library.layout().row_floats);
+  for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
+    callback(DQuat(GridLayout::RotationOf(group.grid.data() + row, joint)));
+  }
+}
+
 // Calls `callback` with each rotation of a joint that occurs in the library.
 template <typename Callback>
 void ForEachRotation(const MotionLibrary& library, std::size_t joint, const Callback& callback) {
-  const GridLayout& layout = library.layout();
-  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   callback(DQuat(library.stand_pose().rotations[joint]));
   for (const MotionGroup& group : library.groups()) {
-    for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
-      callback(DQuat(GridLayout::RotationOf(group.grid.data() + row, joint)));
-    }
+    ForEachRotation(library, group, joint, callback);
   }
   for (const LayerClip& layer : library.layers()) {
     const auto place = std::ranges::find(layer.joints, static_cast<int>(joint));
@@ -109,10 +118,26 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
   if (least_w < kMinBoundedW) return range;
   const double widest = std::max({width.x, width.y, width.z});
   const bool is_rigid = widest < kStillWidth && !is_planted;
-  const double sine = std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
-                      (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + base_margin);
-  constexpr auto kLeast = static_cast<double>(RotationQuantization::kMinLeastW);
-  range.least_w = std::sqrt(std::max(kLeast * kLeast, 1.0 - sine * sine));
+  const auto least_w_of = [](double sine) {
+    constexpr auto kLeast = static_cast<double>(RotationQuantization::kMinLeastW);
+    return std::sqrt(std::max(kLeast * kLeast, 1.0 - sine * sine));
+  };
+  range.least_w =
+      least_w_of(std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
+                 (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + base_margin));
+
+  // Standing avatars turn joints that are still in all examples.
+  if (!library.has_stand_motion()) return range;
+  ForEachRotation(library, library.group(library.idle_group()), joint, [&](const DQuat& q) {
+    const DQuat d = back * q;
+    const double sign = d.w < 0.0 ? -1.0 : 1.0;
+    const DVec3 v(sign * d.x, sign * d.y, sign * d.z);
+    for (int c = 0; c < 3; ++c) {
+      range.low[c] = std::min(range.low[c], static_cast<float>(v[c] - kIdleMargin));
+      range.high[c] = std::max(range.high[c], static_cast<float>(v[c] + kIdleMargin));
+    }
+    range.least_w = std::min(range.least_w, least_w_of(glm::length(v) + 2.0 * kIdleMargin));
+  });
   return range;
 }
 
