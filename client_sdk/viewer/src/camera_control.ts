@@ -64,8 +64,12 @@ export class CameraControl {
         // A view that is taller than wide shows as much sideways as a square one, see ViewCamera.
         const {width, height} = view.freeArea;
         const aspect = Math.min(1.7, Math.max(1, width / Math.max(1, height)));
-        view.desiredDistanceM = Math.min(
+        const distanceM = Math.min(
           110, Math.max(4.4, (extent.radius + 0.7) / (0.384 * aspect) + 0.3 * extent.radius));
+        // Smaller changes come from standing avatars that shift their weight.
+        if (Math.abs(distanceM - view.desiredDistanceM) > 0.03 * distanceM) {
+          view.desiredDistanceM = distanceM;
+        }
         nearest = Math.min(nearest, view.desiredDistanceM);
       }
     }

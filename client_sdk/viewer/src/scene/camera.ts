@@ -7,6 +7,7 @@ import type {TerrainSurface} from '../terrain_surface.js';
 
 const minDistanceM = 1.2;
 const maxDistanceM = 160;
+const slackM = 0.06;
 
 export class Orbit {
   azimuthRad = 0.65;
@@ -54,10 +55,21 @@ export class ViewCamera {
   scale = 1;
   desiredScale = 1;
   private readonly desiredTarget = new THREE.Vector3(0, 0.9, 0);
+  private readonly place = new THREE.Vector3();
 
+  /**
+   * Aims at a place, at once or gradually. The target stays up to `slackM` behind the place, so that
+   * the view does not sway with an avatar that stands and shifts its weight.
+   */
   moveTo(x: number, y: number, z: number, atOnce = false): void {
-    this.desiredTarget.set(x, y, z);
-    if (atOnce) this.target.copy(this.desiredTarget);
+    const place = this.place.set(x, y, z);
+    if (atOnce) {
+      this.desiredTarget.copy(place);
+      this.target.copy(place);
+      return;
+    }
+    const distanceM = this.desiredTarget.distanceTo(place);
+    if (distanceM > slackM) this.desiredTarget.lerp(place, 1 - slackM / distanceM);
   }
 
   /** Moves the target in the ground plane. Arguments are fractions of the view's height. */
