@@ -26,6 +26,13 @@ function(stridewire_target target)
     target_compile_options(${target} PRIVATE -fsanitize=${STRIDEWIRE_SANITIZE}
                            -fno-omit-frame-pointer -fno-sanitize-recover=all)
     target_link_options(${target} PUBLIC -fsanitize=${STRIDEWIRE_SANITIZE})
+    if(STRIDEWIRE_SANITIZE MATCHES undefined AND
+       NOT target MATCHES "^stridewire_(core|offline|protocol)")
+      # With Boost and GoogleTest, checks of each pointer take two fifths of the time to compile.
+      # The address sanitizer also finds null pointers. The code that reads memory and messages from
+      # outside is compiled with all checks.
+      target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,object-size)
+    endif()
     if(STRIDEWIRE_SANITIZE MATCHES thread)
       # The headers of Asio contain fences, which gcc's thread sanitizer does not follow and warns
       # about. Nothing here relies on them: threads share only queues with locks.

@@ -22,11 +22,6 @@ function(stridewire_test name)
   stridewire_optimize_less(${name})
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${STRIDEWIRE_UNITY_BUILD}
                         UNITY_BUILD_BATCH_SIZE 0)
-  if(STRIDEWIRE_SANITIZE MATCHES undefined)
-    # Checks of each pointer take two fifths of the time to compile a test. The code under test is
-    # compiled with all checks.
-    target_compile_options(${name} PRIVATE -fno-sanitize=null,alignment,object-size)
-  endif()
   if(STRIDEWIRE_SANITIZE MATCHES thread AND NOT ARG_THREADS)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
     return()
