@@ -58,8 +58,8 @@ export class ViewCamera {
   private readonly place = new THREE.Vector3();
 
   /**
-   * Aims at a place, at once or gradually. The target stays up to `slackM` behind the place, so that
-   * the view does not sway with an avatar that stands and shifts its weight.
+   * Aims at a place, at once or gradually. The target stays up to `slackM` behind the place, so
+   * that the view does not sway with an avatar that stands and shifts its weight.
    */
   moveTo(x: number, y: number, z: number, atOnce = false): void {
     const place = this.place.set(x, y, z);
