@@ -804,6 +804,20 @@ TEST_F(LibraryTool, SynthesizesTheSameBytesTwice) {
   EXPECT_EQ(folder_.Count(), 3);
 }
 
+TEST_F(LibraryTool, TheSeedSelectsHowEqualStepsVary) {
+  const std::string choreography = folder_.Write("c.json", kStepsOnly);
+  const auto motion = [&](const Arguments& options) {
+    const ProgramResult result = Tool(
+        Join({"synthesize", "builtin", "--choreography", choreography, "--out", Out()}, options));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ReadWhole(Out());
+  };
+  EXPECT_EQ(motion({"--seed", "1"}), motion({"--seed", "1"}));
+  EXPECT_NE(motion({"--seed", "1"}), motion({"--seed", "2"}));
+  EXPECT_EQ(motion({"--seed", "1", "--no-variation", "--no-idle"}),
+            motion({"--seed", "2", "--no-variation", "--no-idle"}));
+}
+
 TEST_F(LibraryTool, SynthesisReportMatchesTheBvhFile) {
   const std::string choreography = folder_.Write("c.json", kWalk);
   const ProgramResult result = Tool({"synthesize", "builtin", "--choreography", choreography,
