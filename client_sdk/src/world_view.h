@@ -27,9 +27,9 @@ class WorldView : public PoseSink {
  public:
   /// Poses of an avatar that is gone can be sampled for this time, in seconds of server time.
   static constexpr double kKeepGoneS = 2.0;
-  /// The view ignores batches from before an avatar left the region for this number of ticks.
+  /// After an avatar has left the region, the view ignores its older poses for this many ticks.
   static constexpr std::uint64_t kKeepLeftTicks = 600;
-  /// A batch from more shards than this is an error.
+  /// Largest number of shards, counted once per mode. A batch of any further shard is an error.
   static constexpr std::size_t kMaxShards = 1024;
 
   struct Counts {

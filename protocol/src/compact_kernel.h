@@ -8,7 +8,8 @@
 
 namespace stridewire::protocol {
 
-/// Number of rows of a pose's numbers: three for the root, one that is 0, and four per joint.
+/// The numbers of a pose are stored in rows: three for the root, one row of zeros, and kJointRows
+/// per joint.
 inline constexpr std::uint16_t kZeroRow = 3;
 inline constexpr std::size_t kJointRows = 4;
 
@@ -16,7 +17,7 @@ inline constexpr std::size_t kJointRows = 4;
 struct CompactPlan {
   std::span<const CompactJoint> joints;
   std::span<const std::uint16_t> order;  // Indices of all joints, each after its parent.
-  std::span<const CompactPart> parts;    // Parts of a multiple of four words.
+  std::span<const CompactPart> parts;    // Of all words. The number of words is a multiple of 4.
 };
 
 /// A block of CompactCodec::kBlock poses. The arrays are those of CompactCodec::Block.

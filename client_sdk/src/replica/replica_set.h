@@ -39,7 +39,7 @@ class PoseSink {
 /// Used by the client library and by stridewire-load. Not thread-safe.
 class ReplicaSet {
  public:
-  /// A message from more shards than this is an error.
+  /// Largest number of shards. A message of any further shard is an error.
   static constexpr std::size_t kMaxShards = 1024;
 
   /// Evaluates at most `max_avatars` avatars and ignores further ones. Each takes about 10 KB.

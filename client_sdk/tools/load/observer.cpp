@@ -27,8 +27,8 @@ Observer::Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint&
   }
 }
 
-// Selects avatars whose indices are evenly spaced. Each observer starts one avatar further than the
-// previous one.
+// Selects avatars whose indices are evenly spaced. The first index is `which`, so observers select
+// different avatars.
 void Observer::SelectAvatars(std::size_t which) {
   const std::size_t all = avatar_count_;
   const std::size_t some = std::min(static_cast<std::size_t>(run_.options.partial_avatars), all);

@@ -45,7 +45,7 @@ class SendQueue {
   /// Creates an empty queue. Movements have a second budget of `control_budget_bytes`.
   SendQueue(std::size_t control_budget_bytes, int backlog_ticks);
 
-  /// Always accepts the frame. The caller is responsible for watching control_bytes().
+  /// Always accepts the frame. The caller must keep control_bytes() within its limit.
   void PushControl(SharedFrame frame);
 
   /// Returns false and does not accept the frame if it would exceed the control budget.

@@ -146,8 +146,8 @@ struct RegionFilter {
   double z = 0.0;
   double outer_m = 0.0;
   double inner_m = 0.0;  ///< Avatars at this distance or nearer are excluded. 0: none are excluded.
-  /// Other rings of the same region use other modes. Deliveries are then needed even if no avatar
-  /// is in this ring, because the positions show which avatars have left the region.
+  /// True if other rings of the same region use other modes. Deliveries are then needed even if no
+  /// avatar is in this ring, because their positions show which avatars have left the region.
   bool is_one_of_several = false;
   bool operator==(const RegionFilter&) const = default;
 };
@@ -178,7 +178,7 @@ struct Interest {
   std::array<PoseInterest, kSentModes.size()> poses;
   bool events = false;
   bool movements = false;
-  bool movement_regions = false;  ///< Some sessions observe the movements in a region.
+  bool movement_regions = false;  ///< True if sessions observe the movements in a region.
 };
 
 /// Poses of one world, shard, mode and tick.

@@ -666,7 +666,7 @@ typedef struct stridewire_statistics {
   uint64_t bytes_sent;
   uint64_t batches_received;  ///< Number of pose batches and movement messages.
   uint64_t poses_received;
-  uint64_t poses_refused;  ///< Poses dropped for lack of memory or because they were not newer.
+  uint64_t poses_refused;  ///< Poses dropped for lack of memory, or not newer than the last.
   /// Number of missing batches, estimated from gaps in the ticks of each shard.
   uint64_t batches_missing;
   uint64_t dropped_batches;  ///< Batches that the server reported as dropped.

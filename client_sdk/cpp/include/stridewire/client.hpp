@@ -45,7 +45,7 @@ struct Position {
   }
 };
 
-/// Creates a request for a step with the given parameters; all others are 0.
+/// Creates a request for a step of height 0. The server chooses the sideways distance.
 inline stridewire_movement Step(std::uint32_t avatar, std::uint64_t request_id, double length_m,
                                 double turn_rad = 0.0,
                                 stridewire_foot foot = STRIDEWIRE_FOOT_AUTO) {

@@ -116,7 +116,10 @@ export class Reader {
         (what) => this.fail(what, name));
   }
 
-  /** Returns a view of the frame. */
+  /**
+   * Returns a list as a typed array, which shares the memory of the frame. Fails unless the list
+   * has `min` to `max` numbers and each of them passes `check`.
+   */
   numbers<T extends NumberArray>(
       field: number, name: string, min: number, max: number,
       type: new (buffer: ArrayBuffer, at: number, length: number) => T,

@@ -146,7 +146,7 @@ class CompactCodec {
 
   std::vector<CompactJoint> joints_;
   std::vector<std::uint16_t> order_;  // Order in which joints are encoded
-  std::vector<CompactPart> parts_;    // Parts of all 32-bit words of a pose
+  std::vector<CompactPart> parts_;    // Contents of the 32-bit words of a pose, in order
   std::size_t pose_bytes_ = 0;
 };
 
