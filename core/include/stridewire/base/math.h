@@ -40,9 +40,9 @@ bool HeadingOf(const Quat& rotation, double& heading_rad);
 /// only square root and division.
 [[nodiscard]] Quat Normalise(const Quat& q);
 
-/// Returns slerp(1, q, fraction) along the short arc, with `fraction` in [0, 1]. If w < 0, q is
-/// negated first; otherwise a rotation by 6 degrees would be one by 177 degrees half-way. Same bits
-/// on every machine.
+/// Returns slerp(1, q, fraction) along the shorter arc, with `fraction` in [0, 1]. If w < 0, it is
+/// computed from the equal rotation -q: half of a rotation by 6 degrees is then one by 3 degrees,
+/// not by 177. Same bits on every machine.
 [[nodiscard]] Quat SlerpFromIdentity(const Quat& q, float fraction);
 
 /// Returns the angle of the rotation a^-1 b, in [0, pi].

@@ -16,7 +16,7 @@ struct RotationQuantization {
   static constexpr std::uint8_t kMinFreeBits = 8;
   static constexpr std::uint8_t kMaxFreeBits = 15;
   static constexpr float kMinStep = 0x1p-20f;
-  /// If w is smaller, it follows from the other components with too large an error.
+  /// If w is smaller, its error is too large, because it is computed from the other components.
   static constexpr float kMinLeastW = 0.3f;
 
   Quat reference = kIdentityQuat;
@@ -26,7 +26,7 @@ struct RotationQuantization {
   std::array<std::uint8_t, 3> bits{};  ///< Bits of each component, 0 to kMaxBits.
   /// Bits per component of smallest-three encoding, kMinFreeBits to kMaxFreeBits; 0: not used.
   std::uint8_t smallest_three_bits = 0;
-  float least_w = 1.0f;  ///< Lower bound for d's w, kMinLeastW to 1.
+  float least_w = 1.0f;  ///< Smallest w of d, kMinLeastW to 1.
   bool operator==(const RotationQuantization&) const = default;
 };
 

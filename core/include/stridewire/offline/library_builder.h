@@ -56,7 +56,7 @@ struct GroupSelection {
   /// Ridge factor with which the stored examples were smoothed (LibraryBuilder::smooths); 0 if they
   /// are stored as captured.
   double ridge = 0.0;
-  double ridge_radius = 0.0;  ///< Radius of the radial functions, in spreads of the parameters.
+  double ridge_radius = 0.0;  ///< Radius of the radial functions, in units of Parameter::scale.
 
   /// Number of examples with this fate.
   [[nodiscard]] int Count(ExampleFate fate) const;

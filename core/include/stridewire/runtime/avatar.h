@@ -19,8 +19,8 @@ enum class AvatarEventType : std::uint8_t {
   kFootStrike,  ///< A foot touched the ground: which foot, and where its ball is.
   kFinished,    ///< A movement ended: the new base frame.
   kIdle,        ///< The avatar stands still and its queue is empty.
-  /// A request could not be carried out: code and reason. If a step or jump was out of reach, also
-  /// what would have been nearest to it. The requests queued after it are played.
+  /// A request could not be carried out: code and reason, and for a step or jump that is out of
+  /// reach the nearest one. The requests queued after it are played.
   kRejected,
 };
 

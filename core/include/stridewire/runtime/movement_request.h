@@ -107,9 +107,9 @@ inline constexpr double kMaxLayerBlendS = 10.0;
 inline constexpr double kMinLayerSpeed = 0.1;
 inline constexpr double kMaxLayerSpeed = 4.0;
 
-/// A step or jump is rejected before it starts if it would miss its place by more than
-/// kMaxRequestErrorM, or its direction or heading by more than kMaxRequestErrorRad. The option
-/// `allow_nearest` of the request permits larger errors.
+/// A step or jump is rejected before it starts if it would end more than kMaxRequestErrorM from the
+/// requested place, or if its direction or heading would be off by more than kMaxRequestErrorRad.
+/// With `allow_nearest`, the avatar plays the nearest step or jump instead.
 inline constexpr double kMaxRequestErrorM = 0.2;
 inline constexpr double kMaxRequestErrorRad = 1.0471975511965976;  ///< 60 degrees.
 

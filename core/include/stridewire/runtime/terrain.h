@@ -17,7 +17,7 @@ inline constexpr std::int32_t kMaxTerrainColumns = 1024;
 inline constexpr std::int32_t kMaxTerrainRows = 1024;
 inline constexpr std::size_t kMaxTerrainBoxes = 65'536;
 inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Magnitude of ground heights.
-inline constexpr double kMinTerrainCellM = 0.01;   ///< Distance of samples of a height field.
+inline constexpr double kMinTerrainCellM = 0.01;   ///< Distance between samples of a height field.
 inline constexpr double kMaxTerrainCellM = 1e3;
 inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Magnitude of each coordinate.
 /// Largest number of boxes that intersect one cell of the terrain's spatial index, which bounds the

@@ -387,7 +387,7 @@ class GroupRefiner {
     return nullptr;
   }
 
-  // Returns the peaks and the worst samples.
+  // Returns the parameters at the peaks of the error and at the samples with the largest errors.
   static std::vector<ParameterValues> HotPoints(const HullSurvey& survey) {
     std::vector<ParameterValues> hot;
     for (const HullPoint& peak : survey.peaks) hot.push_back(peak.p);

@@ -169,7 +169,8 @@ FootPaths::FootPaths(Foot moving, const StepTiming& timing)
       toe_rock_(MakeToeRock(timing)),
       toe_bend_(MakeToeBend(timing)) {
   fixed_ball_m_ = DVec3(StandingBall(OtherFoot(moving)).x, 0.0, 0.0);
-  // Lengths are measured between the balls in the states, where the front ball is raised.
+  // The lengths of the shape are distances between the balls at both ends of the step. There, the
+  // ball of the front foot is raised, and thus further back than if the foot were flat.
   const StepShape& shape = timing.shape;
   start_ball_m_ = fixed_ball_m_ + shape.start_m - DVec3(0.0, 0.0, timing.start.front_ball_back_m());
   end_ball_m_ = fixed_ball_m_ + RotateY(shape.turn_rad) *
@@ -239,8 +240,8 @@ FootPose FootPaths::Moving(double time_s) const {
   return FootOnGround(moving_, end_ball_m_, moving_pitch_.At(time_s), 0.0, timing_.shape.turn_rad);
 }
 
-// Returns the height of the ground at z: at the start of the moving foot, below the fixed foot, or
-// at the end of the moving foot.
+// Returns the height of the ground at z. It has one level at the start of the moving foot, one
+// below the fixed foot, and one where the moving foot lands.
 double FootPaths::GroundAt(double z_m) const {
   const auto edge = [](const DVec3& behind, const DVec3& ahead) {
     return behind.y < ahead.y ? ahead.z - kEdgeBehindBallM : behind.z + kEdgeAheadOfBallM;

@@ -182,7 +182,8 @@ class JumpPath {
   // Landing position of the centre of mass, which is behind the feet.
   [[nodiscard]] double landing_z() const { return 0.84 * length_m_ - 0.08; }
 
-  // Returns the height of the centre of mass, `z_m` ahead, at which the legs have this knee angle.
+  // Returns the height of the centre of mass at which the knees are bent by `knee_rad`, if the
+  // centre of mass is `z_m` ahead of the origin.
   [[nodiscard]] double CentreHeightAtKnee(double time_s, double z_m, double knee_rad) const {
     double low = 0.5, high = 1.5;
     for (int i = 0; i < 28; ++i) {

@@ -287,7 +287,8 @@ class FigureBuilder {
     });
   }
 
-  // Composes the rotations above the root, from the top down to the first joint that turns.
+  // Composes the rotations of the joints above the root, as far as they are constant: from the top
+  // joint down to the first one whose rotation changes.
   void FindFixedTurn() {
     for (std::size_t i = 0; i < root_; ++i) {
       const DQuat first = motion_.LocalRotation(figure_.first_frame, chain_[i]);

@@ -10,13 +10,13 @@ namespace stridewire::complete {
 
 /// A step that every library should have.
 struct BasicStep {
-  /// The movement in messages to users, for example "stops". Empty: messages do not mention the
-  /// step. It is there because blends of the other steps of its group would be poor without it.
+  /// Name of the movement in messages to users, for example "stops". Empty: messages do not mention
+  /// the step, which only improves the blends of the other steps of its group.
   std::string name;
   /// The movement is named after its direction, as in "side steps to the left". Otherwise it is
   /// named after the moving foot, as in "stops with the left foot".
   bool has_direction = false;
-  bool is_to_the_left = false;  ///< If `has_direction`.
+  bool is_to_the_left = false;  ///< The direction, if `has_direction`.
   StepFeet feet;
   bool is_backward = false;
 };

@@ -23,12 +23,13 @@ struct StandParts {
   double width_m = 0.0;              ///< Sideways distance of the feet.
 };
 
-/// Measures mean strides. Over both strides, the swings of arms and pelvis cancel out. The soles
-/// are flat in the middle of single support.
+/// Measures the parts in the mean strides of both feet. Over both strides, the swings of arms and
+/// pelvis cancel out. The soles are flat in the middle of single support.
 [[nodiscard]] StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides);
 
-/// Measures all captured steps of a library, if it contains no level strides straight ahead.
-/// Returns nullopt if the steps do not show the soles of both feet flat on the ground.
+/// Measures the parts in all captured steps of a library, for libraries without level strides
+/// straight ahead. Returns nullopt if the steps do not show the soles of both feet flat on the
+/// ground.
 [[nodiscard]] std::optional<StandParts> MeasureStandParts(const RawLibrary& library);
 
 /// Composes a stand pose with the feet side by side and nearly straight knees.

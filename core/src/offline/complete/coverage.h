@@ -5,10 +5,10 @@
 
 namespace stridewire::complete {
 
-/// Returns true if some captured group of the library contains a step with these feet, or nearly
-/// so: if it is in the hull of a group's examples, or close to it. `stand_side_m` is the sideways
-/// distance of the moving from the fixed foot in the stand pose, which groups without sideways
-/// parameters assume.
+/// Returns true if a captured group of the library can produce a step with these feet: the step is
+/// in the hull of the group's examples, or close to it. `stand_side_m` is the sideways distance
+/// from the fixed to the moving foot in the stand pose. Groups without sideways parameters assume
+/// this distance.
 [[nodiscard]] bool IsCaptured(const RawLibrary& library, Foot moving, const StepFeet& feet,
                               double stand_side_m);
 

@@ -13,8 +13,7 @@ namespace {
 
 constexpr double kStrideLengthM = 0.55;  // For a person with the legs of the generated figure.
 constexpr double kArmSwingRad = 0.2;
-// The bones of upper arms are at least this long, those of collar bones and shoulder blades are
-// shorter.
+// Upper arms are at least this long. Collar bones and shoulder blades are shorter.
 constexpr float kUpperArmM = 0.15f;
 
 struct UpperArm {

@@ -9,8 +9,8 @@
 
 namespace stridewire::complete {
 
-/// A pose in double precision, and the feet that inverse kinematics gives it. World rotations are
-/// relative to the heading.
+/// A pose in double precision, and the places of its feet for inverse kinematics. World rotations
+/// are relative to the heading.
 struct PostureSample {
   DVec3 root_m = DVec3(0.0);
   /// [joint]: rotation relative to the parent; that of the root is relative to the heading.
@@ -19,10 +19,10 @@ struct PostureSample {
   std::array<DVec3, 2> balls_m{DVec3(0.0), DVec3(0.0)};  ///< [Foot]: position of the ball.
 };
 
-/// Returns the normalised linear blend of two rotations along the shorter arc. Its functions are
-/// exactly rounded, so that the result has the same bits on every machine. If both rotations are
-/// multiplied by a constant rotation on either side, the result is multiplied in the same way.
-/// Therefore it does not depend on the axes of joints.
+/// Returns the normalised linear blend of two rotations along the shorter arc. It uses only
+/// correctly rounded operations, so the result has the same bits on every machine. If both
+/// rotations are multiplied by a constant rotation on either side, so is the result. The blend
+/// therefore does not depend on the axes of joints.
 [[nodiscard]] DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b);
 
 /// Returns a + share (b - a) of every part of two samples.

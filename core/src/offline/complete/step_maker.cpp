@@ -36,6 +36,8 @@ constexpr double kSwingEnd = 2.06;
 // In the middle of a swing, pitch and height of the foot contain at least this share of the
 // captured stride, so that the feet do not drag in short steps.
 constexpr double kMinSwingShare = 0.45;
+// Heights of the ball and of the tip of the toes during a swing. The foot is lifted in steps of
+// kLiftStepM until it has them.
 constexpr double kClearanceM = 0.024;
 constexpr double kTipClearanceM = 0.02;
 constexpr double kLiftStepM = 0.004;
@@ -47,7 +49,8 @@ constexpr builtin::DetourRange kDetours = {.max_m = 0.35, .step_m = 0.01, .clear
 constexpr double kSwayShare = 0.45;
 // Largest share of the captured stride. Shares above 1 extrapolate it.
 constexpr double kMaxShare = 1.15;
-// Legs are at most this straight, unless the stand pose is straighter.
+// The distance from hip to ankle is at most this fraction of the length of the leg, unless the legs
+// are straighter in the stand pose.
 constexpr double kMaxExtension = 0.996;
 
 std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
@@ -345,7 +348,7 @@ class StepGenerator {
     return missing;
   }
 
-  // Returns the longest that a leg may be, as a fraction of its full length.
+  // Returns the largest distance from hip to ankle as a fraction of the length of the leg.
   [[nodiscard]] double ExtensionOf(Foot foot) const {
     LegPose leg;
     EvaluateLeg(person_.skeleton, person_.rig, ToPose(person_.stand), foot, leg);
@@ -409,8 +412,8 @@ class StepGenerator {
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;
   double end_s_ = 0.0;
-  HermiteCurve captured_;  // Has the ends of the captured root.
-  HermiteCurve root_;      // Has the ends of the generated root.
+  HermiteCurve captured_;  // Begins and ends like the root of the captured stride.
+  HermiteCurve root_;      // Begins and ends like the root of the generated step.
   double detour_m_ = 0.0;
   double lift_m_ = 0.0;
 };

@@ -30,14 +30,15 @@ struct StepFeet {
   double turn_rad = 0.0;  ///< Positive is left.
 };
 
-/// Generates a step on level ground between two states of a person. A state is a mixture of the
-/// stand pose and of the mean stride of the captures at the same generic time. The share of the
-/// stride grows with the distance between the feet. So every generated step joins the captured
-/// steps and the stand, and has posture and style of the person:
+/// Generates a step on level ground. At every time, its posture is a mixture of the stand pose and
+/// of the mean stride of the captures at the same generic time g(t):
 ///
 ///   posture(t) = (1 - w(t)) stand + w(t) stride(g(t))
 ///
-/// where w changes smoothly from the share at the start to that at the end of the step.
+/// The share w of the stride changes smoothly from the start to the end of the step. At both ends
+/// it depends only on the distance between the feet. Every generated step therefore joins the
+/// captured steps and the stand, and has the posture and style of the person.
+///
 /// Feet are placed first, then the root, which follows a cubic curve plus w times the deviation of
 /// the captured root from such a curve. Then inverse kinematics places the legs.
 ///

@@ -11,7 +11,8 @@
 namespace stridewire::complete {
 namespace {
 
-// Limits of the strides that are averaged: level, straight ahead, from stride to stride.
+// Only steps within these limits are averaged: level, straight ahead, and neither from nor to a
+// stand.
 constexpr double kMinLengthM = 0.25;
 constexpr double kMaxRiseM = 0.06;
 constexpr double kMaxTurnRad = 0.2;

@@ -11,13 +11,13 @@
 
 namespace stridewire::complete {
 
-/// Points of generic time per keytime interval at which the mean stride is stored.
+/// Number of points per keytime interval at which the mean stride is stored.
 inline constexpr int kPointsPerInterval = 16;
-inline constexpr int kIntervals = 3;  ///< Start, toe-off, heel-strike, end.
+inline constexpr int kIntervals = 3;  ///< Between start, toe-off, heel-strike and end.
 inline constexpr int kPointCount = kIntervals * kPointsPerInterval + 1;
 
-/// The mean of the level strides of one foot in the captures, straight ahead, by generic time. The
-/// horizontal origin is the ball of the fixed foot.
+/// The mean of all strides of one foot in the captures that are level and straight ahead, as a
+/// function of generic time. The horizontal origin is the ball of the fixed foot.
 struct StrideModel {
   std::vector<PostureSample> points;  ///< [point]
   std::array<double, kIntervals + 1> keytimes_s{};
@@ -39,7 +39,7 @@ struct StrideModel {
 };
 
 /// Makes the strides of both feet continue each other. The end of one and the start of the other
-/// are measured on different steps, so that they differ. Both get the mean posture and velocity,
+/// are measured on different steps, so they differ. Both get the mean posture and velocity,
 /// and the differences are distributed over half of each stride.
 void JoinStrides(std::array<StrideModel, 2>& strides);
 

@@ -15,8 +15,8 @@ constexpr double kStepDefaultS = 0.55;
 constexpr double kStepMinS = 0.25;
 constexpr double kStepMaxS = 1.0;
 
-// The fit at the ends of a recording uses priors with these standard deviations.
 constexpr double kDegree = std::numbers::pi / 180.0;
+// The fit at the ends of a recording uses priors with these standard deviations.
 constexpr double kNoiseRad = 4.0 * kDegree;
 constexpr double kSlopeRadPerS = 50.0 * kDegree;
 constexpr double kOscillationRad = 8.0 * kDegree;

@@ -30,9 +30,9 @@ struct Posture {
   Pose mean;
   /// [joint]: true if the joint does not turn relative to its parent.
   std::vector<bool> is_rigid;
-  /// [joint]: mean direction of up in the joint's own frame while its foot stands flat on the
-  /// ground, of unit length. Zero for joints that are not part of a foot, and if that foot never
-  /// stands while the other one swings.
+  /// [joint]: mean up direction in the joint's own frame while its foot stands flat on the ground;
+  /// a unit vector. Zero for joints that do not belong to a foot, and for feet that never stand
+  /// while the other foot swings.
   std::vector<DVec3> sole_up;
 };
 

@@ -61,7 +61,8 @@ std::vector<SideInName> SideLettersOf(std::string_view name) {
   return sides;
 }
 
-// Returns the joint whose name differs from `name` in one side or in all of them, or -1.
+// Returns the joint whose name is `name` with one or all of its words for left and right exchanged,
+// or -1.
 int JointOfOtherSide(const Skeleton& skeleton, std::string_view name,
                      std::vector<SideInName> sides) {
   for (const SideInName& side : sides) {

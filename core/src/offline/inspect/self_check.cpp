@@ -151,7 +151,7 @@ class Checker {
     }
   }
 
-  // Returns the largest difference between the length of a requested step and its result.
+  // Returns the largest difference between the requested and the actual length of a step.
   [[nodiscard]] double LargestStepMiss() const {
     double largest_m = 0.0;
     for (const MovementRecord& record : steps_->movements) {

@@ -116,8 +116,8 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(d
     STRIDEWIRE_CHECK(plan.has_value());
     return Redirection{*plan, redirected};
   }
-  // The other requests need planted feet. While planting fades in, they wait, because feet would
-  // move when it begins to fade in again.
+  // The other requests need planted feet. They wait while planting fades in: if they started a new
+  // fade-in, standing feet would move.
   const bool is_fading =
       movement_time_s_ < body_.movement.start_offset_s + body_.movement.feet.plant_fade_s;
   if (!body_.plants_feet || is_fading) return std::nullopt;

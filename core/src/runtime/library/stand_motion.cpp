@@ -18,15 +18,15 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586;
 constexpr double kRadPerDegree = kTwoPi / 360.0;
 
-// Time in which an avatar reaches its stand pose. A game expects a stop within 0.3 s.
+// Time in which an avatar reaches its stand pose. Games expect a stop within 0.3 s.
 constexpr double kSettleEaseS = 0.3;
-constexpr double kSettleS = 0.5;
+constexpr double kSettleS = 0.5;  // Duration of the group `settle`.
 // The idle motion fades in slowly, because it may begin in the middle of a weight shift.
 constexpr double kIdleEaseS = 2.0;
 constexpr double kIdleTailS = 2.0;
 static_assert(kIdleTailS >= kIdleEaseS);
 constexpr int kSettleCells = 4;
-// Fast enough for sway of 0.5 Hz. Between grid points the soles move by less than 0.01 mm.
+// Dense enough for sway of 0.5 Hz. Between grid points the soles move by less than 0.01 mm.
 constexpr int kIdleCellsPerS = 8;
 
 // Amplitudes of the sway of the pelvis and of breathing. While a person stands quietly, the pelvis

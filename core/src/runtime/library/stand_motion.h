@@ -20,7 +20,7 @@ inline constexpr double kIdleLoopS = 40.0;
 ///
 /// The feet do not move. The same skeleton and stand pose give the same bits on every machine.
 struct StandMotion {
-  /// `rig` must be usable.
+  /// `rig.is_usable` must be true.
   StandMotion(const Skeleton& skeleton, const LegRig& rig, const Pose& stand_pose);
   StandMotion(const StandMotion&) = delete;
   StandMotion& operator=(const StandMotion&) = delete;

@@ -12,6 +12,7 @@ class StrideVariation {
   /// Largest deviation of RateFactor() from 1.
   static constexpr double kMaxRateChange = 0.036;
 
+  /// `movement_number` is the number of the movement in the life of the avatar.
   StrideVariation(std::uint64_t seed, std::uint64_t movement_number);
 
   /// Returns the factor for the playback speed of the step. Half of its deviation is drawn for this

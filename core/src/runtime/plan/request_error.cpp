@@ -17,7 +17,7 @@ constexpr double kSamePlaceM = 0.05;
 
 double Horizontal(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 
-// Returns what a step reaches before planting corrects it.
+// Returns the result of a step before planting corrects it.
 RequestTarget StepResult(const MotionLibrary& library, const RequestPlan& plan, Foot moving) {
   const MotionGroup& group = library.group(plan.group);
   const LocomotionProfile& profile = library.locomotion_profile();
@@ -47,14 +47,14 @@ RequestError StepError(const MotionLibrary& library, const RequestPlan& plan, co
                                    plan.max_extra_turn_rad);
   }
 
-  // Places relative to the fixed foot in the heading at the start.
+  // Landing places relative to the fixed foot, in the heading at the start.
   const DVec3 asked_m = RotateYaw(asked.turn_rad, asked.vector_m);
   DVec3 reached_m = RotateYaw(reached.turn_rad, reached.vector_m);
   DVec3 missed_m = reached.vector_m - asked.vector_m;
   double turn_error_rad = std::fabs(reached.turn_rad - asked.turn_rad);
   if (plan.exact) {
     missed_m = reached_m - asked_m;
-    if (conditions.plants_feet) {
+    if (conditions.plants_feet) {  // Planting moves and turns the foot to the footprint.
       const double length_m = Horizontal(missed_m);
       const double rest = std::max(0.0, length_m - plan.most_residual_m) / std::max(length_m, 1e-9);
       missed_m.x *= rest;

@@ -15,7 +15,7 @@ struct LandingConditions {
 
 /// What a planned step or jump will reach, and how far that is from its request.
 struct RequestError {
-  RequestTarget reached;
+  RequestTarget reached;    ///< Result of the step or jump, in the terms of its request.
   double distance_m = 0.0;  ///< Distance between the landing places, >= 0.
   /// Angle between the paths to the landing places or between the headings, whichever is larger,
   /// >= 0. Paths are compared only if the landing places differ and are not close to the start.

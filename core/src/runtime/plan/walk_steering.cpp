@@ -177,7 +177,7 @@ double WalkSteering::DistanceM(DVec3 from, std::size_t next_waypoint, const DVec
 
 double WalkSteering::EffortM(Foot moved, std::size_t next_waypoint) const {
   const Body body = BodyOver(moved);
-  // Position of the body at the goal, derived from the footprint of this foot like `body`.
+  // Position of the body at the goal. Like `body`, it is derived from a footprint of this foot.
   const DVec3 goal_m = GoalPrint(moved).position_m -
                        RotateYaw(goal_.heading_rad, FootOffset(moved, profile_.stand_m));
   const double distance_m = DistanceM(body.position_m, next_waypoint, goal_m);

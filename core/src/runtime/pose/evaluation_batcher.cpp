@@ -9,7 +9,7 @@ namespace {
 // The radix sort takes two passes, one per half of the key.
 constexpr int kHalfBits = 11;
 constexpr std::uint32_t kHalfMask = (1u << kHalfBits) - 1;
-constexpr std::uint32_t kParts = 64;  // Times are grouped into this many parts of a movement.
+constexpr std::uint32_t kParts = 64;  // The sort key divides a movement into these parts.
 
 }  // namespace
 
@@ -62,8 +62,8 @@ std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t 
   return std::span(order_).subspan(begin, end - begin);
 }
 
-// While one pose of a block is evaluated, prefetches a share of the data of the next two blocks: of
-// the block after next the movements themselves, and of the next block the arrays they point to.
+// Prefetches a share of the data of the next two blocks while one pose of a block is evaluated: the
+// arrays to which the movements of the next block point, and the movements of the block after it.
 void EvaluationBatcher::PrefetchNext(std::size_t end, int pose, int count) const {
   const std::size_t lanes = SoaPose::kLanes;
   const auto first = static_cast<std::size_t>(pose) * lanes / static_cast<std::size_t>(count);

@@ -90,7 +90,7 @@ struct SoaPoseEvaluator::Work {
   std::size_t next = 0;
   bool is_planted = false;
   bool is_eased = false;        // True if some lane still has a difference pose at some time.
-  bool is_inertial = false;     // True if some of these lanes are inertial.
+  bool is_inertial = false;     // True if some lane uses inertialization.
   bool has_plant_fade = false;  // True if some lane has a plant fade.
 
   std::vector<kernels::GridSamples> samples;  // [pose]

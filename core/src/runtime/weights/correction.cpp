@@ -279,8 +279,8 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
     if (size > max_sum - kMargin) {
       step.Solve(best.missing, 1.0, halved);
       const double least = SumOfMagnitudes(halved);
-      // The new weights depend linearly on how much they shrink, and the sum of |w| is convex. So
-      // linear interpolation finds a sufficient amount.
+      // The new weights depend linearly on the amount of shrinking, and the sum of |w| is convex in
+      // it. Linear interpolation between no and full shrinking thus gives a sufficient amount.
       const double shrinking = least < size
                                    ? std::min((size - max_sum + kMargin) / (size - least), 1.0) *
                                          best.largest_m / (best.largest_m + kShrinkErrorM)
