@@ -1,6 +1,7 @@
 """Phrases that the project's prose avoids; see "Language" in CONTRIBUTING.md.
 
-They hit twice in 18,568 comments, sentences and strings of Box2D, ozz-animation and meshoptimizer.
+They match only two of 18,568 comments, sentences and strings of Box2D, ozz-animation and
+meshoptimizer.
 """
 import re
 

@@ -1,9 +1,9 @@
 # stridewire_test(NAME [THREADS] [RUN_SERIAL] LABEL <unit|integration|fuzz> SOURCES source...
 #                 [SKIP_UNITY_BUILD source...] LIBRARIES library...)
 #
-# Adds a GoogleTest program whose tests ctest runs one by one. With sanitizers ctest runs each half
-# of the tests in one process, because the start of a process and the generated library take up to
-# three seconds; GTEST_FILTER selects tests.
+# Adds a GoogleTest program whose tests ctest runs one by one. With sanitizers, ctest runs each half
+# of the tests in one process, because starting a process and generating the library take up to
+# three seconds. GTEST_FILTER then selects tests.
 #   THREADS            the code under test has several threads: also built for the thread sanitizer
 #   RUN_SERIAL         no other test runs at the same time
 #   SKIP_UNITY_BUILD   sources whose local names clash with those of other sources
