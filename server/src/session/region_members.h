@@ -67,7 +67,7 @@ class RegionMembers {
   struct ShardMembers {
     std::vector<AvatarId> members;
     protocol::PoseRows::Avatars avatars;  // All avatars of the shard.
-    std::vector<bool> is_member;          // True for members, by row of `avatars`.
+    std::vector<bool> is_member;          // [row of `avatars`]: true for members.
   };
   /// The parts of a delivery that an update needs.
   struct Snapshot {

@@ -16,7 +16,7 @@ constexpr double kSpotTurnRad = 60.0 * kDegree;
 // The following lengths suit a person whose legs have the length kReferenceLegM, and are scaled
 // with the legs.
 constexpr double kReferenceLegM = 0.86;
-constexpr double kSideStepM = 0.3;         // How much wider than in the stand the feet are.
+constexpr double kSideStepM = 0.3;         // Additional width of a side step.
 constexpr double kDiagonalLengthM = 0.4;   // Forward distance of the feet in diagonal steps.
 constexpr double kWidthAfterTurnM = 0.26;  // Sideways distance of the feet after a turn outward.
 constexpr std::array kBackwardLengthsM = {0.0, 0.2, 0.4};

@@ -135,7 +135,7 @@ class StepGenerator {
     if (time_s <= strike_s_) return 1.0 + (time_s - toe_off_s_) / (strike_s_ - toe_off_s_);
     return 2.0 + std::min(1.0, (time_s - strike_s_) / (end_s_ - strike_s_));
   }
-  // Returns the time of a generic time of the captured stride.
+  // Returns the time in the captured stride at a generic time.
   [[nodiscard]] double CapturedTimeAt(double generic) const {
     const auto i = static_cast<std::size_t>(std::min(2.0, std::floor(generic)));
     const auto& keys = stride_.keytimes_s;

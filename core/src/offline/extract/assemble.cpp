@@ -34,8 +34,8 @@ bool IsHeight(ParameterName name) {
 }
 
 // Returns the range of a parameter in a pool. The lowest and the highest value are ignored if there
-// are enough examples. The range of a height includes 0 and every example: neither a single
-// climbing example nor a pool of nothing but equal climbs may pass for level.
+// are enough examples. The range of a height includes 0 and every example, so that neither a single
+// climbing example nor a pool of equally climbing examples counts as level.
 double Spread(const Pool& pool, std::size_t parameter) {
   std::vector<double> values;
   for (const RawExample& example : pool.examples) values.push_back(example.parameters[parameter]);

@@ -68,10 +68,10 @@ constexpr double kMaxEarlyLiftM = 0.03;
 // A foot that leaves the ground this early in the blend-in of its movement is not corrected fully.
 constexpr double kLeastSettled = 0.3;
 
-// Sideways distance between the balls of the feet. A swinging foot that would pass the standing
-// foot closer than kPassApartM is pushed outward by up to kMaxPushM. This is checked while the feet
-// are within kPassingM of each other in the walking direction. A step that starts or lands closer
-// than kCrossingM crosses the legs intentionally.
+// Sideways distances between the balls of the feet. A swinging foot that would pass the standing
+// foot closer than kMinPassingWidthM is pushed outward by up to kMaxPushM. This is checked while
+// the feet are within kPassingLengthM of each other in the walking direction. A step that starts or
+// lands closer than kCrossingWidthM crosses the legs intentionally.
 constexpr double kMinPassingWidthM = 0.11;
 constexpr double kMinLandingWidthM =
     0.05;  // Feet do not land closer than this sideways, unless the request specifies the side.

@@ -22,8 +22,8 @@ constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
 // Planting can distribute an error of this size over a swing (RequestPlan::most_residual_m).
 constexpr double kMaxStartErrorM = 0.25;
-// An inserted step must reduce the cost of a request by at least this much: kWorthAStepM for steps,
-// kWorthClosingM for jumps, whose cost is the distance between the feet.
+// An inserted step must reduce the cost of a request by at least this much: kMinStepGainM for
+// steps, kMinClosingGainM for jumps, whose cost is the distance between the feet.
 constexpr double kMinStepGainM = 0.25;
 constexpr double kMinClosingGainM = 0.03;
 
