@@ -36,7 +36,7 @@ struct GroundPoint {
 /// samples are interpolated bilinearly.
 struct HeightField {
   GroundPoint origin_m;          ///< Position of sample (0, 0), which has the smallest x and z.
-  double cell_m = 0.0;           ///< Distance of samples, kMinTerrainCellM to kMaxTerrainCellM.
+  double cell_m = 0.0;           ///< Sample spacing, kMinTerrainCellM to kMaxTerrainCellM.
   std::int32_t columns = 0;      ///< Samples along x, 2 to kMaxTerrainColumns.
   std::int32_t rows = 0;         ///< Samples along z, 2 to kMaxTerrainRows.
   std::vector<float> heights_m;  ///< [row][column]: heights of the samples, in metres.

@@ -27,7 +27,7 @@ namespace stridewire {
 // variation.
 struct Smoothness {
   double ridge = 0.0;
-  double radius = 0.0;  // Radius of the kernel, in scales of the parameters.
+  double radius = 0.0;  // Radius of the kernel, in units of Parameter::scale.
 };
 
 // Smoothing requires at least this number of examples per coefficient of the linear part. With

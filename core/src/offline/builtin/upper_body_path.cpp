@@ -25,11 +25,11 @@ constexpr double kElbowLag = 0.17;
 
 double Mix(double a, double b, double s) { return a + (b - a) * s; }
 
-// A quantity that oscillates about a middle. Both depend on the state.
+// A quantity that oscillates about `middle`. All values depend on the state.
 struct Oscillation {
   double middle = 0.0;
   double amplitude = 0.0;
-  double lag = 0.0;  // Fraction of a step; 0 if an extreme is in the state.
+  double lag = 0.0;  // Time from the state to an extreme, as a fraction of a step.
 };
 
 // Returns the slope of cos(2 pi cycles (u - lag)) at u = 0, per second.

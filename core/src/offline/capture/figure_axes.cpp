@@ -34,7 +34,8 @@ constexpr double kMaxRise =
     0.3;  // A figure on a level floor moves less than this along the up axis.
 // Smallest difference of cosines by which the motion prefers one up axis to another.
 constexpr double kClearGain = 0.5;
-constexpr double kClearFeet = 0.5;  // Shortest sum of both unit foot vectors that point somewhere.
+// If the sum of both unit foot vectors is shorter, the feet have no common direction.
+constexpr double kClearFeet = 0.5;
 
 DVec3 Unit(const DVec3& v) {
   const double length = glm::length(v);

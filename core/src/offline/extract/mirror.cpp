@@ -121,7 +121,7 @@ FrameRange FlatFrames(const ExtractedExample& step) {
   return {frame_at(kBegin), frame_at(kEnd) + 1};
 }
 
-// Adds the direction of up in the frames of the joints of the standing foot while it is flat.
+// Adds the up direction in the frames of the joints of the standing foot while it is flat.
 void AddSoles(const Skeleton& skeleton, const ExtractedExample& example,
               std::vector<DVec3>& sole_up) {
   if (!IsStep(example.kind)) return;

@@ -17,7 +17,7 @@ bool IsUpper(char c) { return c >= 'A' && c <= 'Z'; }
 bool IsLower(char c) { return c >= 'a' && c <= 'z'; }
 bool IsLetter(char c) { return IsUpper(c) || IsLower(c); }
 
-// A part of a name that says left or right, and the same for the other side.
+// A word or letter for left or right in a name, and its counterpart for the other side.
 struct SideInName {
   std::size_t at = 0;
   std::size_t length = 0;
@@ -76,7 +76,7 @@ int JointOfOtherSide(const Skeleton& skeleton, std::string_view name,
   return skeleton.FindJoint(other);
 }
 
-// Returns the partner of a joint by its name; the joint itself if the name says no side, and -1 if
+// Returns the partner of a joint by its name; the joint itself if the name has no side, and -1 if
 // there is no joint for the other side.
 int PartnerByName(const Skeleton& skeleton, int joint) {
   const std::string& name = skeleton.joints[static_cast<std::size_t>(joint)].name;
@@ -92,7 +92,7 @@ int PartnerByName(const Skeleton& skeleton, int joint) {
     letters.insert(letters.end(), words.begin(), words.end());
     return JointOfOtherSide(skeleton, name, letters);
   }
-  // A single letter says a side only if the joint of the other side exists ("Root", "Ribs").
+  // A single letter is a side only if the joint of the other side exists ("Root", "Ribs").
   const int other = letters.empty() ? -1 : JointOfOtherSide(skeleton, name, letters);
   return other >= 0 ? other : joint;
 }

@@ -37,7 +37,7 @@ constexpr double kRunFeetApartS = 0.1;  // The feet of a runner leave the ground
 constexpr double kPastLowestM = 0.03;   // After this rise, the pelvis has passed its lowest point.
 constexpr double kNextCrouchM = 0.05;   // A later descent by this much begins the next crouch.
 constexpr double kUprightShare = 0.6;   // A standing figure has risen by this share of the crouch.
-constexpr double kNearlyStill = 2.5;    // Largest speed of a standing figure, times still_m_s.
+constexpr double kNearlyStill = 2.5;    // A standing figure moves at up to this times still_m_s.
 constexpr double kUnsettledMinS = 0.1;  // Shortest usable support after landing.
 
 // A parabola through the heights of the pelvis.

@@ -9,7 +9,7 @@
 
 namespace stridewire {
 
-/// A request that was not carried out as asked.
+/// A request that was not met.
 struct Refusal {
   using Values = std::vector<std::pair<std::string, double>>;
 
@@ -19,7 +19,7 @@ struct Refusal {
   /// contain the same names.
   Values asked;
   Values got;
-  double missed_m = 0.0;    ///< Distance between the results asked for and got.
+  double missed_m = 0.0;    ///< Distance between the requested and the actual result.
   double missed_rad = 0.0;  ///< Angle between their directions or headings; the larger one.
   /// One sentence without its subject, the movement: "did not arrive: ...".
   std::string reason;

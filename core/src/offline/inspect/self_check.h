@@ -40,7 +40,7 @@ struct SelfCheck {
 
 /// Plays a few movements with a library, on level ground at 30 frames per second, and checks them:
 ///
-///   three_steps  Three steps of a comfortable length land within 0.2 m of where they should.
+///   three_steps  Three steps of a comfortable length land within 0.2 m of their places.
 ///   stop         After them, a stand brings the feet together within 3 cm.
 ///   walk_to      A walk to a goal 3 m straight ahead arrives. If the library has no stop, the walk
 ///                ends within half a step of the goal.

@@ -280,7 +280,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     if (!may_change || !StartNext(scratch)) break;
   }
   STRIDEWIRE_CHECK(time_s_ <= end_s);
-  // Idle motion that plays on advances by the whole tick at once, as replicas advance it: a sum of
+  // Idle motion that continues advances by the whole tick at once, as replicas advance it: a sum of
   // two parts of a tick may differ in the last bit.
   if (!is_moving_) AdvanceIdleMotion(is_idling_ ? dt_s : left_s, scratch);
   time_s_ = end_s;

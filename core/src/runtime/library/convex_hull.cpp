@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t kMaxCorral = kMaxParameters + 1;
 constexpr int kMaxRounds = 200;
-// Groups of more examples are rare.
+// Groups with more examples are rare.
 constexpr std::size_t kMaxStoredVertices = 256;
 constexpr double kInside = 1e-9;
 

@@ -30,7 +30,8 @@ constexpr std::size_t kAlignment = 64;
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
-// Limits that no human movement comes near. Larger values would lose too much precision in floats.
+// The following limits are far beyond any human movement. Larger values would lose too much
+// precision in floats.
 // Largest absolute value of a parameter, in metres or radians.
 constexpr double kMaxParameter = 100.0;
 // Largest distance of the root from the base frame, along each axis.

@@ -19,7 +19,7 @@ constexpr double kPlantedMargin = 0.3;
 // compensate for the quantization errors of the joints above it.
 constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
-// Margin of the rotations of standing avatars, who play their loop as it is. It only has to
+// Margin of the rotations of standing avatars, which play their loop unchanged. It only has to
 // compensate for quantization errors.
 constexpr double kIdleMargin = 0.0022;
 // A joint whose w falls below this may rotate in any direction and uses smallest-three encoding.

@@ -139,7 +139,7 @@ struct SwingLifts {
   double cost_m = HUGE_VAL;
 };
 
-// Returns what a swing with these heights costs: its peak above both footprints and its steepest
+// Returns the cost of a swing with these heights: its peak above both footprints and its steepest
 // part, from one footprint to the other.
 double SwingCost(const SwingValues& heights_m, double from_m, double to_m) {
   double peak_m = std::max(from_m, to_m);

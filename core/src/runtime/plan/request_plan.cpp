@@ -298,7 +298,7 @@ double NaturalTurn(const MotionGroup& group, const ParameterValues& values) {
   double weights = 0.0;
   for (int s = 0; s < group.example_count; ++s) {
     const auto site = group.site(s);
-    double squared = 1e-6;  // So that the weight of an example at this place is finite.
+    double squared = 1e-6;  // Keeps the weight of an example at this place finite.
     for (std::size_t l = 0; l < site.size(); ++l) {
       const double away = (values.values[l] - site[l]) / group.parameters[l].scale;
       squared += away * away;

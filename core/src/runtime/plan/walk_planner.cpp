@@ -335,7 +335,8 @@ class StepPlanner {
       return std::nullopt;
     }
     plan->max_extra_turn_rad = kMaxWalkTurnRad;
-    // Short and turning steps are the slowest of most libraries, but people take them quickly.
+    // Short and turning steps are the slowest steps of most libraries, but people take them
+    // quickly.
     const double climb_m =
         print.position_m.y - stance_.feet[static_cast<std::size_t>(moving_)].position_m.y;
     if (std::fabs(climb_m) <= kUnhurriedClimbM &&

@@ -10,9 +10,9 @@
 
 namespace stridewire {
 
-/// Computes the parameters of a blend from its first and last pose, and their derivatives by the
-/// weights. That is all that weight correction needs. It evaluates only the chains of joints from
-/// the root to the balls of the feet, with the base frame at the origin. Allocates
+/// Computes the parameters of a blend from its first and last pose, and their derivatives with
+/// respect to the weights. That is all that weight correction needs. It evaluates only the chains
+/// of joints from the root to the balls of the feet, with the base frame at the origin. Allocates
 /// in its constructor only. Same bytes on every machine.
 class EndPoses {
  public:
@@ -30,9 +30,9 @@ class EndPoses {
   /// Returns the parameters of the blend, as MeasureMovement does.
   [[nodiscard]] ParameterValues Measure() const;
 
-  /// Writes J = a'(w), the derivatives of the parameters by each weight at the last blend, to
-  /// `slopes` [d][n], in metres or radians. Individual derivatives also change the sum of the
-  /// weights, so only combinations that keep the sum are meaningful.
+  /// Writes J = a'(w), the derivatives of the parameters with respect to each weight at the last
+  /// blend, to `slopes` [d][n], in metres or radians. Individual derivatives also change the sum of
+  /// the weights, so only combinations that keep the sum are meaningful.
   void MeasureSlopes(std::span<double> slopes);
 
  private:
@@ -53,15 +53,16 @@ class EndPoses {
     std::array<DVec3, 2> arms_m;  // [foot]: vector from the root to the ball, in the base frame.
     [[nodiscard]] DVec3 Ball(std::size_t foot) const { return root_m + arms_m[foot]; }
   };
-  // Derivative of a measurement by the numbers in an example's row.
+  // Derivative of a measurement with respect to the numbers in an example's row.
   class Gradient {
    public:
     void Clear() { joint_count_ = 0; }
     void SetCapacity(std::size_t joint_count) { joints_.resize(joint_count); }
-    // Adds the derivative by the four components of a joint's quaternion. The joint index after the
-    // last one stands for the root's position and yaw.
+    // Adds the derivative with respect to the four components of a joint's quaternion. The joint
+    // index after the last one stands for the root's position and yaw.
     void Add(int joint, const DVec3& by_xyz, double by_w);
-    // Adds the derivative by the weight of each example, whose rows are at `rows`, to `slopes` [n].
+    // Adds the derivative with respect to the weight of each example, whose rows are at `rows`, to
+    // `slopes` [n].
     void AddTo(const float* rows, std::size_t row_floats, std::span<double> slopes) const;
 
    private:
