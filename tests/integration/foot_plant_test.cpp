@@ -185,7 +185,7 @@ TEST_P(FootPlant, SolesStayOnLevelGround) {
   SurveyLegs(*library, *synthesis, true, legs);
   std::printf("%s: seed %u, soles at most %.1f mm above the ground, balls %.1f mm below it\n",
               walker.name, seed, 1e3 * legs.hover_m, 1e3 * legs.sink_m);
-  EXPECT_LE(legs.hover_m, 0.02);
+  EXPECT_LE(legs.hover_m, 0.012);
   EXPECT_LE(legs.sink_m, 0.01);
 }
 

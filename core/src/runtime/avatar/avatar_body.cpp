@@ -92,6 +92,7 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScr
   if (plants_feet) {
     ContinueFeet(keeps_speed, PlanFeet(*library, locks, landing, {blended_pose, earlier}, scratch,
                                        pose, movement));
+    LiftWhileSettling(*library, scratch, pose, movement);
     if (begins_planting) BeginPlantFade(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
     return;

@@ -129,6 +129,7 @@ void PlanFields(Stream& stream, P& plan) {
     for (auto& height : trajectory.height_m) stream.F64(height);
     for (auto& turn : trajectory.turn_rad) stream.F64(turn);
     for (auto& coefficient : trajectory.level_m) stream.F64(coefficient);
+    stream.F64(trajectory.settle_lift_m);
     for (auto& normal : trajectory.normals) {
       Vector(stream, normal);
       stream.CheckUnit(normal);

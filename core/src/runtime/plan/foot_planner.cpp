@@ -67,6 +67,7 @@ constexpr double kLevelClearanceM = 0.012;
 constexpr double kMaxEarlyLiftM = 0.03;
 // A foot that leaves the ground this early in the blend-in of its movement is not corrected fully.
 constexpr double kLeastSettled = 0.3;
+constexpr double kMostlySettled = 0.7;
 
 // Sideways distances between the balls of the feet. A swinging foot that would pass the standing
 // foot closer than kMinPassingWidthM is pushed outward by up to kMaxPushM. This is checked while
@@ -82,7 +83,23 @@ constexpr double kMaxPushM = 0.08;
 constexpr std::array<double, 2> kEarlySamples{0.1, 0.18};
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
-constexpr std::array<double, 5> kStanceSamples{0.0, 0.25, 0.5, 0.75, 1.0};
+// Fractions of the time before release at which the moving foot is sampled, and fractions of the
+// swing shortly before its landing.
+constexpr std::array<double, 2> kReleaseSamples{0.6, 0.8};
+constexpr std::array<double, 3> kLandingSamples{0.9, 0.94, 0.97};
+// A landing foot may briefly be this far in the ground.
+constexpr double kMaxLandingSinkM = 0.008;
+
+// Fractions of the stance at which the standing foot is sampled, and the indices of those at which
+// it is levelled. At the others it may be kStanceSlackM beyond the limits.
+constexpr std::array<double, 16> kStanceSamples{0.0,  0.04, 0.1,  0.17, 0.25, 0.33, 0.42, 0.5,
+                                                0.58, 0.67, 0.75, 0.83, 0.9,  0.95, 0.98, 1.0};
+constexpr std::array<std::size_t, 5> kLevelSamples{0, 4, 7, 10, 15};
+constexpr double kStanceSlackM = 0.002;
+// Fractions of the blend-in at which standing feet are sampled.
+constexpr std::array<double, 7> kSettleSamples{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
+// Standing feet are lifted by at most this while the difference pose fades out.
+constexpr double kMaxSettleLiftM = 0.05;
 
 // Returns the additional height of the ball's centre above the ground on a slope. The centre is at
 // a fixed distance from the ground plane, so the vertical distance grows with the slope.
@@ -106,10 +123,34 @@ double ValueOr(const MotionGroup& group, const ParameterValues& values, Paramete
 struct Quartic {
   double constant;
   std::array<double, 4> coefficients;  // Of u, u^2, u^3 and u^4.
+
+  [[nodiscard]] double At(double u) const {
+    const auto& c = coefficients;
+    return constant + u * (c[0] + u * (c[1] + u * (c[2] + u * c[3])));
+  }
 };
 
-// Returns the quartic that has these values at kStanceSamples, by Newton's forward differences.
-Quartic QuarticThrough(std::array<double, kStanceSamples.size()> values) {
+// Range of heights to add to a sole.
+struct HeightRange {
+  double min_m = 0.0;
+  double max_m = 0.0;
+};
+
+// Returns by how much a sole may be raised that is `above_m` above the ground. Afterwards it may be
+// `slack_m` beyond the usual limits.
+HeightRange LevellingRange(double above_m, double slack_m = 0.0) {
+  return {std::clamp(-kMaxSinkM - slack_m - above_m, -kMaxLevelM, kMaxLevelM),
+          std::clamp(kMaxHoverM + slack_m - above_m, -kMaxLevelM, kMaxLevelM)};
+}
+
+// Returns by how much a sole has to be raised that is `above_m` above the ground.
+double Levelling(double above_m) {
+  const HeightRange range = LevellingRange(above_m);
+  return std::clamp(0.0, range.min_m, range.max_m);
+}
+
+// Returns the quartic that has these values at kLevelSamples, by Newton's forward differences.
+Quartic QuarticThrough(std::array<double, kLevelSamples.size()> values) {
   const double constant = values[0];
   std::array<double, 4> d{};
   for (std::size_t order = 0; order < d.size(); ++order) {
@@ -122,10 +163,44 @@ Quartic QuarticThrough(std::array<double, kStanceSamples.size()> values) {
            256.0 * d[3] / 24.0}};
 }
 
-// Returns by how much a sole has to be raised that is `above_m` above the ground.
-double Levelling(double above_m) {
-  const double excess_m = std::max(above_m - kMaxHoverM, 0.0) + std::min(above_m + kMaxSinkM, 0.0);
-  return std::clamp(-excess_m, -kMaxLevelM, kMaxLevelM);
+// Returns heights that keep a sole on the ground during a stance. `above_m` are its heights above
+// the ground at kStanceSamples, and `ranges` the heights that may be added there. The quartic
+// levels the sole at five samples. If it is out of range at others, it is projected onto one range
+// after the other (Kaczmarz).
+Quartic LevellingQuartic(const std::array<double, kStanceSamples.size()>& above_m,
+                         const std::array<HeightRange, kStanceSamples.size()>& ranges) {
+  constexpr int kSweeps = 20;
+  std::array<double, kLevelSamples.size()> values;
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = Levelling(above_m[kLevelSamples[i]]);
+  Quartic level = QuarticThrough(values);
+  // What is added is a sum of the Legendre polynomials on [0, 1].
+  using Values = std::array<double, 5>;
+  Values added{};
+  const auto basis = [](double u) -> Values {
+    const double x = 2.0 * u - 1.0;
+    const double x2 = x * x;
+    return {1.0, x, 1.5 * x2 - 0.5, (2.5 * x2 - 1.5) * x, (4.375 * x2 - 3.75) * x2 + 0.375};
+  };
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
+      const Values at = basis(kStanceSamples[i]);
+      double height_m = level.At(kStanceSamples[i]);
+      double scale = 0.0;
+      for (std::size_t k = 0; k < at.size(); ++k) {
+        height_m += added[k] * at[k];
+        scale += at[k] * at[k];
+      }
+      const double lacking_m = std::clamp(height_m, ranges[i].min_m, ranges[i].max_m) - height_m;
+      for (std::size_t k = 0; k < at.size(); ++k) added[k] += lacking_m / scale * at[k];
+    }
+  }
+  level.constant += added[0] - added[1] + added[2] - added[3] + added[4];
+  auto& c = level.coefficients;
+  c[0] += 2.0 * added[1] - 6.0 * added[2] + 12.0 * added[3] - 20.0 * added[4];
+  c[1] += 6.0 * added[2] - 30.0 * added[3] + 90.0 * added[4];
+  c[2] += 20.0 * added[3] - 140.0 * added[4];
+  c[3] += 70.0 * added[4];
+  return level;
 }
 
 constexpr std::size_t kEarlyLift = 0;
@@ -201,7 +276,8 @@ class Planner {
         cache_(scratch.cache()),
         pose_(pose),
         movement_(movement),
-        sampler_(scratch, pose) {}
+        sampler_(scratch, pose),
+        contact_sampler_(scratch, pose) {}
 
   FeetAt FeetOf(ConstPoseSpan pose) const {
     FeetAt feet;
@@ -233,6 +309,16 @@ class Planner {
     times_s_[kEntry + 1] = movement_.start_offset_s + kBlendStepS;
     times_s_[kBlendedEnd] = movement_.duration_s();
     sampler_.Sample(movement_, times_s_, kBlendedEnd);
+    for (std::size_t i = 0; i < kReleaseSamples.size(); ++i) {
+      contact_times_s_[kStandingLate + i] =
+          movement_.start_offset_s +
+          kReleaseSamples[i] * std::max(0.0, swing.release_s - movement_.start_offset_s);
+    }
+    for (std::size_t i = 0; i < kLandingSamples.size(); ++i) {
+      contact_times_s_[kLandingSoon + i] =
+          swing.release_s + kLandingSamples[i] * (swing.land_s - swing.release_s);
+    }
+    contact_sampler_.Sample(movement_, contact_times_s_, contact_times_s_.size());
   }
   FeetAt KeyPoseAt(std::size_t time) const {
     return {sampler_.FootAt(time, Foot::kLeft), sampler_.FootAt(time, Foot::kRight)};
@@ -256,7 +342,7 @@ class Planner {
       const DVec3 stands = locks[f].print.position_m;
       const DVec3 start = sampler_.Ball(0, foot);
       double lowest_m = start.y;
-      for (std::size_t i = 1; i < times_s.size(); ++i) {
+      for (const std::size_t i : kLevelSamples) {
         lowest_m = std::min(lowest_m, sampler_.Ball(i, foot).y);
       }
       position += DVec3(stands.x - start.x,
@@ -269,12 +355,16 @@ class Planner {
       const auto f = static_cast<std::size_t>(foot);
       const double ground_m =
           locks[f].print.position_m.y + SlopeRise(rig_.sides[f], locks[f].normal);
-      std::array<double, kStanceSamples.size()> heights_m;
+      const double raised_m = movement_.base.position_m.y - ground_m;
+      std::array<double, kStanceSamples.size()> above_m;
+      std::array<HeightRange, kStanceSamples.size()> ranges;
       for (std::size_t i = 0; i < times_s.size(); ++i) {
-        heights_m[i] =
-            Levelling(movement_.base.position_m.y + sampler_.LowestSole(i, foot) - ground_m);
+        above_m[i] = raised_m + sampler_.LowestSole(i, foot);
+        ranges[i].min_m = LevellingRange(above_m[i], kStanceSlackM).min_m;
+        ranges[i].max_m =
+            LevellingRange(raised_m + sampler_.LowestPoint(i, foot), kStanceSlackM).max_m;
       }
-      level_[f] = QuarticThrough(heights_m);
+      level_[f] = LevellingQuartic(above_m, ranges);
     }
   }
   // Returns heights that keep the sole of a staying foot on the ground during the movement. Valid
@@ -337,8 +427,25 @@ class Planner {
         locks[x].print.position_m.y + SlopeRise(rig_.sides[x], locks[x].normal) + rise_m;
     trajectory.height_m[2] = trajectory.to.position_m.y +
                              SlopeRise(rig_.sides[m], trajectory.normals[1]) - ground_m +
-                             EndLevelling(ground_m)[m];
+                             LandingLevelling(moving, ground_m);
     return landing;
+  }
+
+  // Returns by how much the sole of the moving foot has to be raised from its landing to the end of
+  // the movement, so that it stands on ground at height `ground_m`.
+  double LandingLevelling(Foot moving, double ground_m) const {
+    const double at_landing_m = sampler_.LowestSole(kLanding, moving) - ground_m;
+    const double at_end_m = sampler_.LowestSole(kBlendedEnd, moving) - ground_m;
+    double lowest_m = std::min(at_landing_m, at_end_m);
+    for (std::size_t i = 0; i < kLandingSamples.size(); ++i) {
+      lowest_m = std::min(lowest_m, contact_sampler_.LowestFlatSole(kLandingSoon + i, moving) -
+                                        ground_m + kMaxLandingSinkM - kMaxSinkM);
+    }
+    const HeightRange lowest = LevellingRange(lowest_m);
+    const HeightRange highest = LevellingRange(std::max(at_landing_m, at_end_m));
+    // If the foot rises or sinks a lot while it stands, it may go a little deeper.
+    if (lowest.min_m > highest.max_m) return std::max(highest.max_m, lowest.min_m - kMaxSinkM);
+    return std::clamp(0.0, lowest.min_m, highest.max_m);
   }
 
   // Returns by how much the soles of the blended pose have to be raised at the end of the movement,
@@ -357,13 +464,28 @@ class Planner {
   // leaves the ground, so that its sole stays on the ground at height `ground_m`. `start_m` is the
   // height at the start, `settled_m` the height without levelling.
   double ReleaseHeight(Foot moving, double ground_m, double start_m, double settled_m) const {
-    const double since_s = times_s_[kRelease] - movement_.start_offset_s;
-    const double settled = 1.0 - EaseOut(since_s / movement_.ease_out_s);
+    const auto settled_at = [&](double time_s) {
+      return 1.0 - EaseOut((time_s - movement_.start_offset_s) / movement_.ease_out_s);
+    };
+    const double settled = settled_at(times_s_[kRelease]);
     const double height_m = start_m + settled * (settled_m - start_m);
-    const double raise_m = Levelling(sampler_.LowestSole(kRelease, moving) + height_m - ground_m);
-    // After the blend-in, the foot reaches this height before its heel rises: correct it by half.
-    if (raise_m < 0.0 && since_s > movement_.ease_out_s) return settled_m + 0.5 * raise_m;
-    return settled_m + raise_m / std::max(settled, kLeastSettled);
+    double raise_m = Levelling(sampler_.LowestSole(kRelease, moving) + height_m - ground_m) /
+                     std::max(settled, kLeastSettled);
+    for (std::size_t i = 0; i < kReleaseSamples.size(); ++i) {
+      const double settled_i = settled_at(contact_times_s_[kStandingLate + i]);
+      if (settled_i < kMostlySettled) continue;
+      const double before_m = start_m + settled_i * (settled_m - start_m);
+      const double base_m = before_m - ground_m;
+      const double least_m =
+          LevellingRange(contact_sampler_.LowestFlatSole(kStandingLate + i, moving) + base_m).min_m;
+      const double most_m =
+          LevellingRange(contact_sampler_.LowestSole(kStandingLate + i, moving) + base_m).max_m;
+      raise_m = std::clamp(raise_m, std::min(least_m, most_m), most_m);
+    }
+    // After the blend-in, the foot reaches this height before its heel rises: correct it by half,
+    // as far as the foot does not hover then.
+    if (raise_m < 0.0 && settled == 1.0) raise_m = std::min(0.5 * raise_m, raise_m + kMaxSinkM);
+    return settled_m + raise_m;
   }
 
   // Keeps both feet on their footprints while an avatar stands. `previous` are the feet of the pose
@@ -414,6 +536,34 @@ class Planner {
         std::min(LevelLift(moving, kEarlyLift, -kMaxSinkM, kEarlySamples, kEarly), kMaxEarlyLiftM);
     lift_m[kMiddleLift] = std::min(
         LevelLift(moving, kMiddleLift, kLevelClearanceM, kSwingSamples, kSwing), kMaxLiftM);
+  }
+
+  // Lifts standing feet so that their balls and ankles do not sink into level ground while the
+  // difference pose fades out, as far as the soles do not hover then.
+  void LiftWhileSettling() {
+    std::array<double, kSettleSamples.size()> times_s;
+    for (std::size_t i = 0; i < times_s.size(); ++i) {
+      times_s[i] = movement_.start_offset_s + kSettleSamples[i] * movement_.ease_out_s;
+    }
+    sampler_.Sample(movement_, times_s, times_s.size());
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      FootTrajectory& trajectory = movement_.feet.foot(foot);
+      const bool stays = trajectory.release_s == FootTrajectory::kNever;
+      HeightRange lift{stays ? -kMaxSettleLiftM : 0.0, kMaxSettleLiftM};
+      for (std::size_t i = 0; i < times_s.size() && times_s[i] <= trajectory.release_s; ++i) {
+        const BlendedFoot blended{.ball_m = sampler_.Ball(i, foot)};
+        const double raised_m = CorrectFoot(movement_, foot, times_s[i], blended).offset_m.y -
+                                trajectory.from.position_m.y;
+        const double share = SettleLiftShare(1.0 - EaseOut(kSettleSamples[i]));
+        lift.min_m = std::max(lift.min_m,
+                              (-kMaxSinkM - raised_m - sampler_.LowestFlatSole(i, foot)) / share);
+        lift.max_m =
+            std::min(lift.max_m, (kMaxHoverM - raised_m - sampler_.LowestSole(i, foot)) / share);
+      }
+      // If the foot would sink with one lift and hover with another, prefers the smaller one.
+      const auto [least, most] = std::minmax(lift.min_m, lift.max_m);
+      trajectory.settle_lift_m = std::clamp(stays ? 0.0 : std::max(least, 0.0), least, most);
+    }
   }
 
   // Returns the outward push that the swinging foot needs to pass the standing leg.
@@ -617,6 +767,7 @@ class Planner {
   PoseSpan pose_;
   Movement& movement_;
   FootSampler sampler_;
+  FootSampler contact_sampler_;     // At contact_times_s_.
   std::array<Quartic, 2> level_{};  // [foot]
 
   // Indices of the times that SampleKeyPoses samples. kRelease and kLanding each have one time
@@ -631,6 +782,10 @@ class Planner {
   static constexpr std::size_t kBlendedEnd = kEntry + 2;
   static_assert(kBlendedEnd < FootSampler::kMaxTimes);
   std::array<double, kBlendedEnd + 1> times_s_;
+  // Times shortly before the moving foot leaves the ground, and before it lands.
+  static constexpr std::size_t kStandingLate = 0;
+  static constexpr std::size_t kLandingSoon = kReleaseSamples.size();
+  std::array<double, kReleaseSamples.size() + kLandingSamples.size()> contact_times_s_;
 };
 
 }  // namespace
@@ -846,6 +1001,13 @@ std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& lo
                                const LandingDecision& decision, const BlendSource& source,
                                FootPlanScratch& scratch, PoseSpan pose, Movement& movement) {
   return Plan(library, locks, nullptr, decision, source, scratch, pose, movement);
+}
+
+void LiftWhileSettling(const MotionLibrary& library, FootPlanScratch& scratch, PoseSpan pose,
+                       Movement& movement) {
+  const MotionGroup& group = library.group(movement.group);
+  if (!movement.feet.is_active || movement.feet.keeps_above_ground || !IsStep(group.kind)) return;
+  Planner(library, scratch, pose, movement).LiftWhileSettling();
 }
 
 LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {

@@ -96,6 +96,12 @@ std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& lo
                                const LandingDecision& decision, const BlendSource& source,
                                FootPlanScratch& scratch, PoseSpan pose, Movement& movement);
 
+/// Sets FootTrajectory::settle_lift_m of a planned step on level ground, so that its standing feet
+/// do not sink while the difference pose fades out. Call this when the residuals of the plan are
+/// set. `scratch` and `pose` as for PlanFeet.
+void LiftWhileSettling(const MotionLibrary& library, FootPlanScratch& scratch, PoseSpan pose,
+                       Movement& movement);
+
 /// Returns the foot locks at a time of a planned movement at which both feet stand. `pose` is the
 /// blended pose with its difference pose at that time.
 [[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,

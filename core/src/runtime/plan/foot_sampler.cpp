@@ -196,4 +196,17 @@ double FootSampler::LowestSole(std::size_t i, Foot foot) const {
   return roots_m_[1][i] + LegAt(i, foot).LowestSole(library_.leg_rig().side(foot));
 }
 
+double FootSampler::LowestFlatSole(std::size_t i, Foot foot) const {
+  const auto f = static_cast<std::size_t>(foot);
+  const LegRig::Side& side = library_.leg_rig().side(foot);
+  return roots_m_[1][i] +
+         std::min(balls_m_[f][1][i] - side.ball_height_m, ankles_m_[f][1][i] - side.ankle_height_m);
+}
+
+double FootSampler::LowestPoint(std::size_t i, Foot foot) const {
+  const auto f = static_cast<std::size_t>(foot);
+  const double toe_m = toe_tips_m_[f][1][i] - library_.leg_rig().side(foot).toe_height_m;
+  return std::min(LowestFlatSole(i, foot), roots_m_[1][i] + toe_m);
+}
+
 }  // namespace stridewire

@@ -36,6 +36,10 @@ class FootSampler {
   [[nodiscard]] BlendedFoot FootAt(std::size_t i, Foot foot) const;
   /// Returns the height of a foot at the `i`th time, in world space (LegPose::LowestSole).
   [[nodiscard]] double LowestSole(std::size_t i, Foot foot) const;
+  /// Returns the same without the tip of the toes.
+  [[nodiscard]] double LowestFlatSole(std::size_t i, Foot foot) const;
+  /// Returns the same if the tip of the toes may not be lower than the rest of the sole.
+  [[nodiscard]] double LowestPoint(std::size_t i, Foot foot) const;
 
  private:
   [[nodiscard]] bool SampleTogether(const Movement& movement, std::span<const double> times_s,

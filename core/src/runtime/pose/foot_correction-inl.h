@@ -19,6 +19,7 @@ struct TrajectoryOf {
   Number from_heading, to_heading, release_turn, root_weight, residual_turn, residual_turn_s;
   Number lift[3];
   Number residual_over_s, release_s, land_s;
+  Number settle_lift;
   Number locks_height;  // 1 if FootTrajectory::locks_height, else 0.
 };
 
@@ -39,6 +40,13 @@ STRIDEWIRE_INLINE Number LiftShareOf(const LiftCurve& curve, Number swing) {
   return (Constant<Number>(1.0) -
           EaseOut(DivideBy(swing - Constant<Number>(curve.begin), curve.top - curve.begin))) *
          EaseOut(DivideBy(swing - Constant<Number>(curve.falls), curve.end - curve.falls));
+}
+
+// Returns the share of FootTrajectory::settle_lift_m that is added when the fraction `settled` of
+// the difference pose has faded out.
+template <typename Number>
+STRIDEWIRE_INLINE Number SettleLiftShareOf(Number settled) {
+  return Constant<Number>(4.0) * settled * (Constant<Number>(1.0) - settled);
 }
 
 // Returns the part of the body's extra turn (Movement::extra_turn_rad) that is complete at a time.
@@ -85,6 +93,7 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   const Number locked = Select(trajectory.locks_height > zero, c.offset.y, zero);
   c.offset.y = locked + height[0] + settled * (height[1] - height[0]) + rise * risen +
                u * (level[0] + u * (level[1] + u * (level[2] + u * level[3]))) +
+               trajectory.settle_lift * SettleLiftShareOf(settled) +
                trajectory.lift[0] * LiftShareOf(kLiftCurves[0], s) +
                trajectory.lift[1] * LiftShareOf(kLiftCurves[1], s) +
                trajectory.lift[2] * LiftShareOf(kLiftCurves[2], s);

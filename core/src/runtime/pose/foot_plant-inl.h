@@ -86,7 +86,8 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   t.residual_offset = XyzOf(q), t.lift[2] = q.w;
   q = next();
   t.residual_velocity = XyzOf(q), t.locks_height = q.w;
-  t.root_shift = XyzOf(next());
+  q = next();
+  t.root_shift = XyzOf(q), t.settle_lift = q.w;
   q = next();
   t.level[0] = q.x, t.level[1] = q.y, t.level[2] = q.z, t.level[3] = q.w;
   return t;

@@ -83,6 +83,7 @@ TrajectoryOf<double, DVec3> TrajectoryFor(const FootPlan& plan, Foot foot) {
           .residual_over_s = residual.over_s,
           .release_s = from.release_s,
           .land_s = from.land_s,
+          .settle_lift = from.settle_lift_m,
           .locks_height = from.locks_height ? 1.0 : 0.0};
 }
 
@@ -96,6 +97,8 @@ DVec3 RootShare(const FootCorrection& correction) {
 }
 
 }  // namespace
+
+double SettleLiftShare(double settled) { return SettleLiftShareOf(settled); }
 
 double LiftShare(std::size_t lift, double swing) { return LiftShareOf(kLiftCurves[lift], swing); }
 
@@ -268,7 +271,7 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     add(DVec3(trajectory.normals[1]), trajectory.lift_m[0]);
     add(residual.offset_m, trajectory.lift_m[2]);
     add(residual.offset_m_s, trajectory.locks_height ? 1.0 : 0.0);
-    add(trajectory.root_shift_m, 0.0);
+    add(trajectory.root_shift_m, trajectory.settle_lift_m);
     const auto& level_m = trajectory.level_m;
     add({level_m[0], level_m[1], level_m[2]}, level_m[3]);
   }

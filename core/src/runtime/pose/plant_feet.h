@@ -34,6 +34,10 @@ struct FootCorrection {
   DVec3 root_shift_m = DVec3(0.0);
 };
 
+/// Returns the fraction of FootTrajectory::settle_lift_m that is added when the fraction `settled`
+/// of the difference pose has faded out.
+[[nodiscard]] double SettleLiftShare(double settled);
+
 /// Returns the fraction of FootTrajectory::lift_m[lift] that is added at a fraction of the swing.
 [[nodiscard]] double LiftShare(std::size_t lift, double swing);
 
