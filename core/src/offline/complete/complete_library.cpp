@@ -25,6 +25,9 @@ using complete::BasicStepGroup;
 using complete::Person;
 using complete::StrideModel;
 
+// Soles of stands are less tilted than this.
+constexpr double kMaxTiltM = 0.02;
+
 // Collects the names of steps that the captures lack, to one side or to both.
 class LackingList {
  public:
@@ -106,7 +109,9 @@ std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion)
     completion.failure = "the legs of this skeleton do not support inverse kinematics";
     return std::nullopt;
   }
-  if (auto reason = complete::WhyNoStand(library.skeleton, person.rig, library.stand_pose)) {
+  auto reason = complete::WhyNoStand(library.skeleton, person.rig, library.stand_pose);
+  if (!reason && library.stand_tilt_m > kMaxTiltM) reason = "the feet are on their heels or toes";
+  if (reason) {
     const auto parts = has_strides ? complete::MeasureStandParts(person.strides)
                                    : complete::MeasureStandParts(library);
     if (!parts) {
@@ -118,6 +123,7 @@ std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion)
     completion.stand_reason = *std::move(reason);
     completion.has_composed_stand = true;
     library.stand_pose = complete::ComposeStand(library.skeleton, person.rig, *parts);
+    library.stand_tilt_m = 0.0;
     person.rig = RigOf(library);
   }
   person.stand = complete::SampleOf(library.skeleton, library.stand_pose, 0.0);

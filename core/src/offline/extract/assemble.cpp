@@ -158,7 +158,7 @@ class Assembler {
                         "at least 5 of one foot are needed, or level steps"
                       : "the captures contain no usable step or jump");
     }
-    library.stand_pose = StandPose(library);
+    SetStandPose(library);
     return library;
   }
 
@@ -273,26 +273,26 @@ class Assembler {
     });
   }
 
-  // Returns the stillest standing pose of all captures. If there is none, returns the first pose of
-  // the first example.
-  [[nodiscard]] Pose StandPose(const RawLibrary& library) const {
+  // Sets the stand pose to the stillest standing pose of all captures or, if there is none, to the
+  // first pose of the first example.
+  void SetStandPose(RawLibrary& library) const {
     STRIDEWIRE_CHECK(!library.groups.empty() && !library.groups.front().examples.empty());
     const Extraction* best = nullptr;
     for (const Extraction& file : files_) {
       if (!file.error.empty() || !file.stand) continue;
       if (best == nullptr || file.stand->unrest < best->stand->unrest) best = &file;
     }
+    Pose& pose = library.stand_pose;
     if (best != nullptr) {
-      Pose pose = best->stand->pose;
+      pose = best->stand->pose;
       Raise(pose, Shift(*best));
       leveller_->Level(PoseSpan(pose));
-      return pose;
+      library.stand_tilt_m = best->stand->tilt_m;
+      return;
     }
     const ConstPoseSpan first = library.groups.front().examples.front().clip.frame(0);
-    Pose pose;
     pose.root_position_m = first.root_position_m;
     pose.rotations.assign(first.rotations.begin(), first.rotations.end());
-    return pose;
   }
 
   const AssembleOptions& options_;

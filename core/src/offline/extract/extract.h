@@ -88,6 +88,7 @@ struct Extraction {
     /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
     Pose pose;
     double unrest = 0.0;  ///< Deviation from still, upright standing; smaller is better.
+    double tilt_m = 0.0;  ///< Deviation of the feet from flat ones, in height.
   };
   std::optional<Stand> stand;  ///< The stillest moment with both feet on the same ground.
 };

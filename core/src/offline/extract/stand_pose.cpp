@@ -6,6 +6,7 @@
 #include "base/check.h"
 #include "offline/base/horizontal_distance.h"
 #include "offline/base/statistics.h"
+#include "offline/extract/foot_paths.h"
 #include "offline/extract/normalise.h"
 #include "stridewire/runtime/pose.h"
 
@@ -21,6 +22,10 @@ constexpr double kStridePerM = 2.0;
 constexpr double kCrouchPerM = 4.0;
 // Penalty per metre by which the pelvis is not above the feet, or the head not above the pelvis.
 constexpr double kLeanPerM = 2.0;
+// Penalty per metre by which ankle and tip of the toes are not as high above the ball as in a flat
+// foot. Smaller deviations than kFlatM do not count.
+constexpr double kTiltPerM = 4.0;
+constexpr double kFlatM = 0.015;
 
 double StandHeight(const BodyTracks& tracks) {
   std::vector<double> heights;
@@ -41,6 +46,17 @@ double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   return HorizontalDistance(pelvis, ankles) + HorizontalDistance(DVec3(*top), pelvis);
 }
 
+// Returns by how much a foot is not flat. Figures may also be still on their heels or toes, for
+// example after a fall.
+double Tilt(const FootPaths& foot, int frame) {
+  double tilt_m = 0.0;
+  for (const std::size_t point : {FootPaths::kAnkle, FootPaths::kToeTip}) {
+    const double above_m = foot.Height(point, frame) - foot.Height(FootPaths::kBall, frame);
+    tilt_m += std::max(0.0, std::fabs(above_m - foot.flat_height_m[point]) - kFlatM);
+  }
+  return tilt_m;
+}
+
 }  // namespace
 
 std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip& clip,
@@ -54,6 +70,8 @@ std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip&
                                          StandingFrames(contacts.feet[1], count)};
   const int reach = std::max(1, static_cast<int>(std::lround(0.5 * kWindowS * clip.fps)));
   const double stand_height = StandHeight(tracks);
+  const FootPaths feet[2] = {MakeFootPaths(tracks.feet[0], clip.fps, kWindowS),
+                             MakeFootPaths(tracks.feet[1], clip.fps, kWindowS)};
   const auto joints = static_cast<std::size_t>(skeleton.joint_count());
   std::vector<Vec3> before(joints);
   std::vector<Vec3> after(joints);
@@ -76,7 +94,8 @@ std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip&
     const double speed = moved / static_cast<double>(joints) * clip.fps / (2.0 * reach);
     const double unrest = speed + kStridePerM * std::fabs(apart.z) +
                           kCrouchPerM * std::max(0.0, stand_height - tracks.pelvis_m[k].y) +
-                          kLeanPerM * Lean(skeleton, after);
+                          kLeanPerM * Lean(skeleton, after) +
+                          kTiltPerM * (Tilt(feet[0], i) + Tilt(feet[1], i));
     if (!best || unrest < *best) {
       best = unrest;
       best_frame = i;
@@ -98,6 +117,7 @@ std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip&
   stand.pose.root_position_m = cut.root_positions_m[0];
   stand.pose.rotations = cut.rotations;
   stand.unrest = *best;
+  stand.tilt_m = Tilt(feet[0], best_frame) + Tilt(feet[1], best_frame);
   return stand;
 }
 
