@@ -20,6 +20,9 @@ constexpr std::size_t kMinForAnArea = std::size(kStraightStepParameters) + 1;
 // With at least this many examples, the lowest and the highest value are ignored as possible
 // outliers.
 constexpr std::size_t kOutlierFreeMin = 4;
+// Steps that turn by more than this are left out of groups without the parameter for turns, if
+// other steps remain.
+constexpr double kStraightTurnMaxRad = 0.6;
 
 // Examples of one kind with all their parameters, before they become a group.
 struct Pool {
@@ -247,8 +250,20 @@ class Assembler {
 
   void AddGeneral(Pool pool, bool with_height, RawLibrary& library) const {
     if (pool.examples.empty()) return;
-    const std::vector<std::size_t> spanned =
-        SpannedParameters(pool, kStraightStepParameters, with_height, options_);
+    const auto spanned_of = [&] {
+      return SpannedParameters(pool, kStraightStepParameters, with_height, options_);
+    };
+    std::vector<std::size_t> spanned = spanned_of();
+    const auto turn = static_cast<std::size_t>(std::ranges::find(pool.names, ParameterName::kTurn) -
+                                               pool.names.begin());
+    if (std::ranges::find(spanned, turn) == spanned.end()) {
+      // Requests take the steps of a group without turns as steps straight ahead.
+      const auto turns = [&](const RawExample& example) {
+        return std::fabs(example.parameters[turn]) > kStraightTurnMaxRad;
+      };
+      if (!std::ranges::all_of(pool.examples, turns)) std::erase_if(pool.examples, turns);
+      spanned = spanned_of();
+    }
     library.groups.push_back(MakeGroup(std::move(pool), spanned));
   }
 
