@@ -412,6 +412,37 @@ TEST_F(LibraryTool, ReportsWhetherWalksArrive) {
   EXPECT_FALSE(output["walks"][1]["reason"].get<std::string>().empty());
 }
 
+TEST_F(LibraryTool, ReportsSpeedsThatTheLibraryCannotWalk) {
+  const std::string choreography = folder_.Write("c.json", R"({"movements":[
+          {"walk_to":{"position_m":[0,0,4],"heading_rad":0}},
+          {"walk_to":{"position_m":[0,0,10],"heading_rad":0,"speed_m_s":1}},
+          {"walk_to":{"position_m":[0,0,16],"heading_rad":0,"speed_m_s":3}},
+          {"walk_to":{"position_m":[0,0,18],"heading_rad":0,"speed_m_s":0.06}}]})");
+  const std::vector<std::string> arguments = {"synthesize", "builtin", "--choreography",
+                                              choreography, "--out",   Out()};
+  const ProgramResult text = Tool(arguments);
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_THAT(text.out,
+              AllOf(HasSubstr("; movements[2] walks at "),
+                    HasSubstr(" m/s instead of 3 m/s: the library walks at "),
+                    HasSubstr("; movements[3] walks at "), testing::Not(HasSubstr("movements[0]")),
+                    testing::Not(HasSubstr("movements[1]"))));
+  std::vector<std::string> json_arguments = arguments;
+  json_arguments.push_back("--json");
+  const json walks = ParseOutput(Tool(json_arguments).out)["walks"];
+  ASSERT_EQ(walks.size(), 4u);
+  EXPECT_TRUE(walks[0]["requested_m_s"].is_null());
+  EXPECT_GT(walks[0]["speed_m_s"], 0.5);
+  EXPECT_EQ(walks[0]["speed_note"], "");
+  EXPECT_NEAR(walks[1]["speed_m_s"].get<double>(), 1.0, 0.12);
+  EXPECT_EQ(walks[1]["speed_note"], "");
+  EXPECT_EQ(walks[2]["requested_m_s"], 3.0);
+  EXPECT_LT(walks[2]["speed_m_s"], 2.5);
+  EXPECT_THAT(walks[2]["speed_note"].get<std::string>(), HasSubstr("the library walks at "));
+  EXPECT_GT(walks[3]["speed_m_s"], 0.1);
+  EXPECT_NE(walks[3]["speed_note"], "");
+}
+
 TEST_F(LibraryTool, SkipsExactStepsOutOfReach) {
   const std::string choreography =
       folder_.Write("c.json", R"({"movements":[{"step":{"length_m":0.5}},

@@ -1,6 +1,10 @@
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <optional>
+#include <span>
+#include <string>
 
 #include "command_line.h"
 #include "commands.h"
@@ -11,6 +15,7 @@
 #include "stridewire/offline/choreography.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/offline/synthesis.h"
+#include "stridewire/runtime/avatar.h"
 
 namespace stridewire {
 namespace {
@@ -57,6 +62,24 @@ Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
   json["request"] = record.request_id == 0 ? Json(nullptr) : Json(record.request_id - 1);
   json["base"] = BaseToJson(record.base);
   return json;
+}
+
+std::optional<double> RequestedSpeed(const WalkRecord& record,
+                                     std::span<const MovementRequest> requests) {
+  const auto request = std::ranges::find(requests, record.request_id, &MovementRequest::id);
+  if (request == requests.end()) return std::nullopt;
+  const auto* walk = std::get_if<WalkRequest>(&request->movement);
+  return walk != nullptr ? walk->speed_m_s : std::nullopt;
+}
+
+// States which speeds are possible if the library cannot walk at the requested one; otherwise
+// empty.
+std::string SpeedNote(const WalkSpeeds& speeds, const std::optional<double>& requested_m_s) {
+  if (!requested_m_s || !speeds.IsOutside(*requested_m_s)) return {};
+  char text[100];
+  std::snprintf(text, sizeof text, "the library walks at %.2f to %.2f m/s", speeds.slowest_m_s,
+                speeds.fastest_m_s);
+  return text;
 }
 
 // Returns the report of a choreography that the library cannot play. `error.where` contains the
@@ -114,6 +137,11 @@ int RunSynthesize(const SynthesizeCommand& command) {
       !status) {
     return PrintOutputError(status.error());
   }
+  const std::vector<MovementRequest>& requests = choreography->movements;
+  const bool has_speeds = std::ranges::any_of(synthesis->walks, [&](const WalkRecord& walk) {
+    return RequestedSpeed(walk, requests).has_value();
+  });
+  const WalkSpeeds speeds = has_speeds ? MeasureWalkSpeeds(*library) : WalkSpeeds{};
   if (command.json) {
     Json json;
     json["fps"] = command.fps;
@@ -124,11 +152,16 @@ int RunSynthesize(const SynthesizeCommand& command) {
     }
     json["walks"] = Json::array();
     for (const WalkRecord& walk : synthesis->walks) {
-      json["walks"].push_back({{"request", walk.request_id - 1},
-                               {"arrived", walk.arrived},
-                               {"reason", walk.reason},
-                               {"end_s", walk.end_s},
-                               {"base", BaseToJson(walk.base)}});
+      const auto requested_m_s = RequestedSpeed(walk, requests);
+      json["walks"].push_back(
+          {{"request", walk.request_id - 1},
+           {"arrived", walk.arrived},
+           {"reason", walk.reason},
+           {"end_s", walk.end_s},
+           {"base", BaseToJson(walk.base)},
+           {"requested_m_s", requested_m_s ? Json(*requested_m_s) : Json(nullptr)},
+           {"speed_m_s", walk.speed_m_s},
+           {"speed_note", SpeedNote(speeds, requested_m_s)}});
     }
     json["skipped"] = Json::array();
     for (const SkippedRequest& request : synthesis->skipped) {
@@ -159,6 +192,14 @@ int RunSynthesize(const SynthesizeCommand& command) {
   for (const Refusal& refusal : refusals) {
     const auto request = static_cast<unsigned long long>(refusal.request_id - 1);
     std::printf("; movements[%llu] %s", request, refusal.reason.c_str());
+  }
+  for (const WalkRecord& walk : synthesis->walks) {
+    const auto requested_m_s = RequestedSpeed(walk, requests);
+    const std::string note = SpeedNote(speeds, requested_m_s);
+    if (note.empty()) continue;
+    std::printf("; movements[%llu] walks at %.2f m/s instead of %g m/s: %s",
+                static_cast<unsigned long long>(walk.request_id - 1), walk.speed_m_s,
+                *requested_m_s, note.c_str());
   }
   if (!synthesis->stop_reason.empty()) {
     std::printf("; the feet are apart at the end: %s", synthesis->stop_reason.c_str());

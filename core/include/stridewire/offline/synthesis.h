@@ -55,7 +55,8 @@ struct WalkRecord {
   bool arrived = false;
   std::string reason;  ///< Reason why the walk failed; empty if `arrived`.
   double end_s = 0.0;
-  BaseFrame base;  ///< Base frame at the end of the walk.
+  BaseFrame base;          ///< Base frame at the end of the walk.
+  double speed_m_s = 0.0;  ///< AvatarEvent::speed_m_s
 };
 
 /// A step or jump that was skipped because it was out of reach.

@@ -70,6 +70,9 @@ struct AvatarEvent {
   const char* reason = "";
   /// kRejected: set if the request was a step or jump that is out of reach.
   std::optional<FootprintError> missed;
+  /// End of a walk (kFinished or kRejected): its mean speed without the first three and the last
+  /// two steps. 0 if the walk had fewer than six steps.
+  double speed_m_s = 0.0;
 };
 
 /// Describes a kRejected event in one sentence of at most 200 bytes, for example "the footprint is
@@ -196,5 +199,24 @@ class AvatarCrowd {
   struct Scratch;
   std::unique_ptr<Scratch> scratch_;
 };
+
+/// Range of the speeds at which the avatars of a library walk straight ahead on level ground.
+struct WalkSpeeds {
+  double slowest_m_s = 0.0;
+  double fastest_m_s = 0.0;  ///< 0 if the library cannot walk far enough to measure its speed.
+
+  /// Speeds that differ by this fraction count as equal, because strides vary.
+  static constexpr double kTolerance = 0.05;
+
+  /// Returns `speed_m_s` if the library can walk at this speed, otherwise the nearest end of the
+  /// range. If the range is unknown, returns 0.
+  [[nodiscard]] double Nearest(double speed_m_s) const;
+  /// Returns true if the range is known and `speed_m_s` is outside of it by more than kTolerance.
+  [[nodiscard]] bool IsOutside(double speed_m_s) const;
+};
+
+/// Measures the range by simulating a fast and a slow walk of a few metres. Takes about as long as
+/// planning 30 steps. The same library gives the same values on every machine.
+[[nodiscard]] WalkSpeeds MeasureWalkSpeeds(const std::shared_ptr<const MotionLibrary>& library);
 
 }  // namespace stridewire

@@ -70,10 +70,11 @@ struct StandRequest {
 /// steps have the id of the request. On arrival a kFinished event of kind kStand with this id
 /// follows; if the walk fails, a kRejected event with the reason.
 struct WalkRequest {
-  DVec3 position_m = DVec3(0.0);    ///< Base frame at the end. y is ignored; the ground sets it.
-  double heading_rad = 0.0;         ///< Heading of the base frame at the end.
-  std::vector<DVec3> waypoints_m;   ///< Points to pass in this order; at most kMaxWaypoints.
-  std::optional<double> speed_m_s;  ///< Walking speed, as far as the library's steps allow.
+  DVec3 position_m = DVec3(0.0);   ///< Base frame at the end. y is ignored; the ground sets it.
+  double heading_rad = 0.0;        ///< Heading of the base frame at the end.
+  std::vector<DVec3> waypoints_m;  ///< Points to pass in this order; at most kMaxWaypoints.
+  /// Walking speed, as far as the library's steps allow (WalkSpeeds).
+  std::optional<double> speed_m_s;
 };
 
 /// When a request begins, and whether it replaces the requests before it.

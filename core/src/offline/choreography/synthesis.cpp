@@ -280,7 +280,7 @@ Expected<Synthesis> Synthesize(const SynthesisInput& input) {
         result.movements.push_back(std::move(record));
       } else if (EndsWalk(event, walks)) {
         result.walks.push_back({event.request_id, event.type == AvatarEventType::kFinished,
-                                event.reason, event.time_s, event.base});
+                                event.reason, event.time_s, event.base, event.speed_m_s});
       } else if (event.missed) {
         result.skipped.push_back(
             {event.request_id, DescribeRejection(event), event.time_s, *event.missed});

@@ -137,6 +137,7 @@ int AvatarSimulation::CancelQueue() {
   queue_.clear();
   queue_head_ = 0;
   walk_ = {};
+  walk_pace_ = {};
   interrupts_ = may_redirect_ = false;
   start_not_before_s_ = 0.0;
   return dropped;
@@ -405,20 +406,27 @@ WalkDecision AvatarSimulation::PlanNextWalkStep(WalkProgress& progress) const {
 // Starts the next step of the walk at the head of the queue. The request stays in the queue until
 // the walk has arrived or is rejected.
 void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
+  walk_pace_.Add(base_.position_m, time_s_);
   const WalkDecision decision = PlanNextWalkStep(walk_);
   if (decision.outcome == WalkOutcome::kStep) {
     StartPlan(decision.plan, queue_[queue_head_].id, scratch);
     return;
   }
+  const double speed_m_s = walk_pace_.mean_m_s();  // PopQueue may reset it.
   const std::uint64_t id = PopQueue();
   walk_ = {};
+  walk_pace_ = {};
   if (decision.outcome == WalkOutcome::kArrived) {
-    AddEvent({.type = AvatarEventType::kFinished, .request_id = id, .base = base_});
+    AddEvent({.type = AvatarEventType::kFinished,
+              .request_id = id,
+              .base = base_,
+              .speed_m_s = speed_m_s});
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = id,
               .base = base_,
-              .reason = decision.reason});
+              .reason = decision.reason,
+              .speed_m_s = speed_m_s});
   }
 }
 

@@ -302,7 +302,8 @@ class AvatarSimulation {
   Foot last_moved_ = Foot::kRight;
   // Group of the previous movement, or the number of groups after a stand.
   std::size_t last_group_ = 0;
-  WalkProgress walk_;  // Progress of the walk at the head of the queue.
+  WalkProgress walk_;   // Progress of the walk at the head of the queue.
+  WalkPace walk_pace_;  // Speed of that walk.
   // The queue consists of the elements from index queue_head_ on.
   std::vector<MovementRequest> queue_;
   std::size_t queue_head_ = 0;

@@ -526,6 +526,25 @@ WalkDecision Reject(const char* reason) {
 
 }  // namespace
 
+void WalkPace::Add(const DVec3& position_m, double time_s) {
+  Mark mark{.path_m = 0.0, .time_s = time_s};
+  if (marks_ > 0) {
+    const DVec3 moved_m = position_m - position_m_;
+    mark.path_m = last_.back().path_m + std::sqrt(moved_m.x * moved_m.x + moved_m.z * moved_m.z);
+  }
+  if (marks_ == kStartSteps) started_ = mark;
+  std::ranges::rotate(last_, last_.begin() + 1);
+  last_.back() = mark;
+  position_m_ = position_m;
+  ++marks_;
+}
+
+double WalkPace::mean_m_s() const {
+  if (marks_ <= kStartSteps + kStopSteps + 1) return 0.0;
+  const Mark& ended = last_.front();
+  return (ended.path_m - started_.path_m) / (ended.time_s - started_.time_s);
+}
+
 WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                           const WalkRequest& walk, const WalkStance& stance,
                           WalkProgress& progress) {

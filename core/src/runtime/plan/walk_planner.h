@@ -36,6 +36,29 @@ struct WalkProgress {
   std::array<bool, 2> is_aimed{};
 };
 
+/// Measures how fast a walk is. A new walk starts with a default value.
+class WalkPace {
+ public:
+  /// Must be called where a step of the walk begins or ends, with the base frame and the time.
+  void Add(const DVec3& position_m, double time_s);
+  /// Returns the mean speed without the first kStartSteps and the last kStopSteps steps. 0 if no
+  /// other steps are left.
+  [[nodiscard]] double mean_m_s() const;
+
+ private:
+  static constexpr std::size_t kStartSteps = 3;
+  static constexpr std::size_t kStopSteps = 2;
+
+  struct Mark {
+    double path_m = 0.0;  // Length of the walk so far.
+    double time_s = 0.0;
+  };
+  std::array<Mark, kStopSteps + 1> last_;  // The latest marks, the oldest first.
+  Mark started_;                           // The mark after the first kStartSteps steps.
+  DVec3 position_m_ = DVec3(0.0);
+  std::size_t marks_ = 0;
+};
+
 enum class WalkOutcome : std::uint8_t { kStep, kArrived, kRefused };
 
 struct WalkDecision {

@@ -180,6 +180,40 @@ TEST_F(AvatarTest, RejectsRequestsOutOfReach) {
   EXPECT_NEAR(started[0].time_s, 0.0, 1e-9);
 }
 
+TEST_F(AvatarTest, ReportsHowFastItWalked) {
+  const WalkSpeeds speeds = MeasureWalkSpeeds(library_);
+  EXPECT_GT(speeds.slowest_m_s, 0.05);
+  EXPECT_GT(speeds.fastest_m_s, 1.5 * speeds.slowest_m_s);
+  EXPECT_LT(speeds.fastest_m_s, 3.0);
+  const double between_m_s = 0.5 * (speeds.slowest_m_s + speeds.fastest_m_s);
+  EXPECT_EQ(speeds.Nearest(between_m_s), between_m_s);
+  EXPECT_EQ(speeds.Nearest(5.0), speeds.fastest_m_s);
+  EXPECT_EQ(speeds.Nearest(0.05), speeds.slowest_m_s);
+  EXPECT_FALSE(speeds.IsOutside(between_m_s));
+  EXPECT_FALSE(speeds.IsOutside(1.04 * speeds.fastest_m_s));
+  EXPECT_TRUE(speeds.IsOutside(1.06 * speeds.fastest_m_s));
+  EXPECT_TRUE(speeds.IsOutside(0.05));
+  EXPECT_FALSE(WalkSpeeds{}.IsOutside(1.0));
+  EXPECT_EQ(WalkSpeeds{}.Nearest(1.0), 0.0);
+
+  Request(WalkRequest{.position_m = DVec3(0.0, 0.0, 6.0), .speed_m_s = between_m_s});
+  Request(WalkRequest{.position_m = DVec3(0.0, 0.0, 12.0), .speed_m_s = 5.0});
+  Request(WalkRequest{.position_m = DVec3(0.0, 0.0, 12.0)});
+  std::vector<AvatarEvent> ends;
+  for (const AvatarEvent& event : RunUntilIdle()) {
+    const bool is_end = event.type == AvatarEventType::kFinished && event.group < 0;
+    if (is_end) {
+      ends.push_back(event);
+    } else {
+      EXPECT_EQ(event.speed_m_s, 0.0);
+    }
+  }
+  ASSERT_EQ(ends.size(), 3u);
+  EXPECT_NEAR(ends[0].speed_m_s, between_m_s, 0.05 * between_m_s);
+  EXPECT_NEAR(ends[1].speed_m_s, speeds.fastest_m_s, 0.05 * speeds.fastest_m_s);
+  EXPECT_EQ(ends[2].speed_m_s, 0.0) << "the avatar was there already";
+}
+
 // Inserted steps do not help a request that is out of reach, so the avatar does not move.
 TEST_F(AvatarTest, DoesNotStepForARequestOutOfReach) {
   Request(StepRequest{.length_m = 0.4});
