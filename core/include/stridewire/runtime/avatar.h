@@ -101,9 +101,9 @@ struct AvatarOptions {
   /// weight. Their feet do not move. If false, or if feet are not planted, avatars stand still in
   /// the last pose of their last movement.
   bool idle_motion = true;
-  /// Let the duration and the pose of steps vary slightly, as those of people do. Steps meet their
-  /// parameters and footprints as accurately as without variation. Steps with `exact_only` do not
-  /// vary. If false, equal steps are repeated exactly.
+  /// Vary the duration and the pose of steps slightly, as people do. Steps meet their parameters
+  /// and footprints as accurately as without. Steps with `exact_only` do not vary. False by
+  /// default, because each avatar needs its own `seed`; the server and `synthesize` set both.
   bool stride_variation = false;
   /// Selects the place in the loop of the idle motion and the variation of steps, so that avatars
   /// of a crowd do not move in unison.
