@@ -23,6 +23,7 @@
 
 namespace {
 
+using stridewire::client::AllowNearest;
 using stridewire::client::Client;
 using stridewire::client::Jump;
 using stridewire::client::Stand;
@@ -154,14 +155,14 @@ class GameServer {
     const double turn_rad = Turn(event, steps);
     for (int i = 0; i < steps; ++i) {
       const double varied_m = length_m * Random(0.9, 1.1);
-      movements.push_back(Step(avatar, ++request_id_,
-                               std::clamp(varied_m, settings_.step_m[0], settings_.step_m[1]),
-                               turn_rad));
+      const double step_m = std::clamp(varied_m, settings_.step_m[0], settings_.step_m[1]);
+      // The lengths are random, so the nearest movement of the library is as good.
+      movements.push_back(AllowNearest(Step(avatar, ++request_id_, step_m, turn_rad)));
     }
     movements.push_back(Stand(avatar, ++request_id_, Random(0.3, 1.0)));
     if (can_jump_ && Random(0.0, 1.0) < 0.6) {
-      movements.push_back(
-          Jump(avatar, ++request_id_, Random(settings_.jump_m[0], settings_.jump_m[1])));
+      const double jump_m = Random(settings_.jump_m[0], settings_.jump_m[1]);
+      movements.push_back(AllowNearest(Jump(avatar, ++request_id_, jump_m)));
       movements.push_back(Stand(avatar, ++request_id_, Random(0.3, 1.0)));
     }
     last_requests_[avatar] = request_id_;

@@ -27,7 +27,8 @@ bool IsMovement(const stridewire_movement& m) {
          InRange(m.interrupt, STRIDEWIRE_QUEUED, STRIDEWIRE_NOW) &&
          m.waypoint_count <= STRIDEWIRE_MAX_WAYPOINTS &&
          (m.type != STRIDEWIRE_WALK || m.waypoint_count == 0 || m.waypoints_m != nullptr) &&
-         (m.exact_only == 0 || (m.type == STRIDEWIRE_STEP && m.has_at != 0));
+         (m.exact_only == 0 || (m.type == STRIDEWIRE_STEP && m.allow_nearest == 0)) &&
+         (m.allow_nearest == 0 || m.type == STRIDEWIRE_STEP || m.type == STRIDEWIRE_JUMP);
 }
 
 decltype(protocol::RequestItem::movement) ToMovement(const stridewire_movement& m) {
@@ -35,10 +36,11 @@ decltype(protocol::RequestItem::movement) ToMovement(const stridewire_movement& 
     case STRIDEWIRE_STEP: {
       protocol::StepMovement step;
       step.foot = static_cast<protocol::FootChoice>(m.foot);
+      step.exact_only = m.exact_only != 0;
+      step.allow_nearest = m.allow_nearest != 0;
       if (m.has_at != 0) {
         step.at.emplace().position_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
         if (m.has_heading != 0) step.at->heading_rad = m.heading_rad;
-        step.exact_only = m.exact_only != 0;
         return step;
       }
       step.length_m = m.length_m;
@@ -47,7 +49,8 @@ decltype(protocol::RequestItem::movement) ToMovement(const stridewire_movement& 
       step.turn_rad = m.turn_rad;
       return step;
     }
-    case STRIDEWIRE_JUMP: return protocol::JumpMovement{m.length_m, m.height_m, m.turn_rad};
+    case STRIDEWIRE_JUMP:
+      return protocol::JumpMovement{m.length_m, m.height_m, m.turn_rad, m.allow_nearest != 0};
     case STRIDEWIRE_STAND: return protocol::StandMovement{m.seconds};
     case STRIDEWIRE_WALK: {
       protocol::WalkMovement walk;

@@ -384,13 +384,23 @@ void Session::Handle(const protocol::Events& message, double now_s) {
     event.extrapolated = e.extrapolated ? 1 : 0;
     event.clamped = e.clamped ? 1 : 0;
     event.cut_short = e.cut_short ? 1 : 0;
-    if (e.type == protocol::EventType::kFootStrike) {
+    const bool is_step = e.kind <= protocol::MovementKind::kStepRight;
+    if (e.type == protocol::EventType::kFootStrike ||
+        (e.type == protocol::EventType::kRejected && is_step)) {
       event.foot =
           e.foot == protocol::FootSide::kLeft ? STRIDEWIRE_FOOT_LEFT : STRIDEWIRE_FOOT_RIGHT;
     }
     CopyVector(e.position_m, event.position_m);
     CopyVector(e.base.position_m, event.base_position_m);
     event.base_heading_rad = e.base.heading_rad;
+    event.missed_m = e.missed_m;
+    event.missed_rad = e.missed_rad;
+    event.nearest_length_m = e.nearest.length_m;
+    event.nearest_side_m = e.nearest.side_m;
+    event.nearest_height_m = e.nearest.height_m;
+    event.nearest_turn_rad = e.nearest.turn_rad;
+    event.nearest_heading_rad = e.nearest.heading_rad;
+    event.speed_m_s = e.speed_m_s;
     events_.Push(event);
   }
 }

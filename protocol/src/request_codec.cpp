@@ -38,8 +38,8 @@ void CheckFields(Findings& found, const FieldPath& at, const RequestItem& m) {
   VisitRequest(
       m, [&](const char* name, const auto& value) { CheckValue(found, At(at, name), value); });
   const auto* step = std::get_if<StepMovement>(&m.movement);
-  found.That(step == nullptr || step->at || !step->exact_only, ErrorCode::kMalformed,
-             "must_be_met requires at_m", At(at, "at_m"));
+  found.That(step == nullptr || !step->exact_only || !step->allow_nearest, ErrorCode::kMalformed,
+             "must_be_met excludes allow_nearest", At(at, "must_be_met"));
 }
 
 void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, RequestItem& m) {
@@ -48,7 +48,9 @@ void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, Reques
   m.interrupt = static_cast<Interrupt>(w.takeover());
   switch (w.type()) {
     case wire::MovementType::Step: {
-      StepMovement step{.foot = static_cast<FootChoice>(w.foot()), .exact_only = w.must_be_met()};
+      StepMovement step{.foot = static_cast<FootChoice>(w.foot()),
+                        .exact_only = w.must_be_met(),
+                        .allow_nearest = !w.must_be_met() && !w.must_be_near()};
       if (const wire::Vec3* place = w.at_m()) {
         Unpack(u, at, *place, step.at.emplace().position_m);
         step.at->heading_rad = w.heading_rad();
@@ -62,7 +64,7 @@ void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, Reques
       break;
     }
     case wire::MovementType::Jump:
-      m.movement = JumpMovement{w.length_m(), w.height_m(), w.turn_rad()};
+      m.movement = JumpMovement{w.length_m(), w.height_m(), w.turn_rad(), !w.must_be_near()};
       break;
     case wire::MovementType::Stand: m.movement = StandMovement{w.seconds()}; break;
     case wire::MovementType::Walk: {
@@ -88,6 +90,10 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& m) {
   const auto* walk = std::get_if<WalkMovement>(&m.movement);
   const auto foot = step ? step->foot : FootChoice::kAuto;
   const bool is_placed = step && step->at;
+  // must_be_met includes must_be_near.
+  const bool must_be_near = step   ? !step->exact_only && !step->allow_nearest
+                            : jump ? !jump->allow_nearest
+                                   : false;
   double length_m = 0.0, height_m = 0.0, turn_rad = 0.0;
   std::optional<double> side_m, heading_rad;
   std::optional<wire::Vec3> at;
@@ -114,7 +120,7 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& m) {
       static_cast<wire::FootChoice>(foot), length_m, side_m, height_m, turn_rad,
       stand ? stand->seconds : 0.0, at ? &*at : nullptr, heading_rad, waypoints,
       walk ? walk->speed_m_s : std::nullopt, static_cast<wire::Takeover>(m.interrupt),
-      step && step->exact_only);
+      step && step->exact_only, must_be_near);
 }
 
 // ---- sets of parameters

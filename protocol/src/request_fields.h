@@ -5,6 +5,7 @@
 namespace stridewire::protocol {
 
 /// Calls `visit(name, value)` for each field that a request uses, with the names of the schema.
+/// Omits `must_be_near`, whose member `allow_nearest` is its opposite.
 /// `Item` is RequestItem or const RequestItem.
 template <typename Item, typename Visit>
 void VisitRequest(Item& item, const Visit& visit) {
@@ -25,8 +26,11 @@ void VisitRequest(Item& item, const Visit& visit) {
   visit("takeover", item.interrupt);
   if (auto* step = std::get_if<StepMovement>(&item.movement)) {
     visit("foot", step->foot);
-    if (!step->at) return visit_change(*step);
-    visit_target(*step->at);
+    if (step->at) {
+      visit_target(*step->at);
+    } else {
+      visit_change(*step);
+    }
     visit("must_be_met", step->exact_only);
   } else if (auto* jump = std::get_if<JumpMovement>(&item.movement)) {
     visit_change(*jump);

@@ -35,6 +35,14 @@ Json Fields(const RotationQuantization& m) {
 Json Fields(const RequestItem& m) {
   Json json = Json::object();
   VisitRequest(m, [&](const char* name, const auto& value) { json[name] = Value(value); });
+  const auto* step = std::get_if<StepMovement>(&m.movement);
+  const auto* jump = std::get_if<JumpMovement>(&m.movement);
+  // Vectors that are older than these fields do not contain them.
+  if (step != nullptr && !step->at && !step->exact_only) json.erase("must_be_met");
+  if ((step != nullptr && !step->allow_nearest && !step->exact_only) ||
+      (jump != nullptr && !jump->allow_nearest)) {
+    json["must_be_near"] = true;
+  }
   return json;
 }
 
@@ -49,6 +57,12 @@ void FromJson(const Json& json, RequestItem& m) {
   VisitRequest(m, [&]<typename T>(const char* name, T& value) {
     if constexpr (!std::is_const_v<T>) Get(json, name, value);
   });
+  const bool must_be_near = json.value("must_be_near", false);
+  if (auto* step = std::get_if<StepMovement>(&m.movement)) {
+    step->allow_nearest = !step->exact_only && !must_be_near;
+  } else if (auto* jump = std::get_if<JumpMovement>(&m.movement)) {
+    jump->allow_nearest = !must_be_near;
+  }
 }
 
 Json Value(const ParameterSet& set) {

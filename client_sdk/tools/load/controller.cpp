@@ -27,11 +27,14 @@ Movement ToMovement(const MovementRequest& request) {
                                         .length_m = movement.length_m,
                                         .side_m = movement.side_m,
                                         .height_m = movement.height_m,
-                                        .turn_rad = movement.turn_rad};
+                                        .turn_rad = movement.turn_rad,
+                                        .exact_only = movement.exact_only,
+                                        .allow_nearest = movement.allow_nearest};
         } else if constexpr (std::is_same_v<T, JumpRequest>) {
           return protocol::JumpMovement{.length_m = movement.length_m,
                                         .height_m = movement.height_m,
-                                        .turn_rad = movement.turn_rad};
+                                        .turn_rad = movement.turn_rad,
+                                        .allow_nearest = movement.allow_nearest};
         } else if constexpr (std::is_same_v<T, StandRequest>) {
           return protocol::StandMovement{.seconds = movement.seconds};
         } else {

@@ -35,7 +35,8 @@ WanderPlan Wanderer::Next(bool can_jump) {
   WanderPlan plan;
   plan.period_s = kClosingStepS + random_.Uniform(0.0, 1.0);
   if (can_jump && random_.Uniform(0.0, 1.0) < 0.1) {
-    plan.movements.emplace_back(protocol::JumpMovement{.length_m = random_.Uniform(0.4, 1.2)});
+    plan.movements.emplace_back(
+        protocol::JumpMovement{.length_m = random_.Uniform(0.4, 1.2), .allow_nearest = true});
     plan.period_s += kJumpS;
     return plan;
   }
@@ -46,7 +47,8 @@ WanderPlan Wanderer::Next(bool can_jump) {
     plan.movements.emplace_back(
         protocol::StepMovement{.length_m = random_.Uniform(0.4, 0.7),
                                .side_m = {},
-                               .turn_rad = turns ? random_.Uniform(-0.3, 0.3) : 0.0});
+                               .turn_rad = turns ? random_.Uniform(-0.3, 0.3) : 0.0,
+                               .allow_nearest = true});
     plan.period_s += kStepS;
     if (step + 1 == pause_after) {
       const double seconds = random_.Uniform(0.3, 1.5);

@@ -45,11 +45,11 @@ export class FootprintTool {
     readonly pane: WorldPane; readonly avatar: number; readonly requestId: bigint;
     atM: readonly [number, number, number]; moved: boolean;
   } | null = null;
-  /** The nearest reachable footprint of the last exact step that was rejected. */
+  /** The nearest reachable footprint of the last step that was rejected. */
   private nearestReachable:
     Footprint & {readonly pane: WorldPane; readonly untilMs: number} | null = null;
-  /** Requests of this page that require the exact point. */
-  private readonly exactRequests = new Set<bigint>();
+  /** Steps to footprints that this page has requested. */
+  private readonly requests = new Set<bigint>();
 
   constructor(private readonly host: FootprintHost) {}
 
@@ -79,7 +79,7 @@ export class FootprintTool {
     const requestId = nextRequestId();
     this.nearestReachable = null;
     const exact = this.host.exactOnly();
-    if (exact) this.exactRequests.add(requestId);
+    this.requests.add(requestId);
     void pane.world.request([
       {avatar, type: 'step', requestId, foot: 'auto', atM, ...(exact ? {exactOnly: true} : {})},
     ]).then((reply) => {
@@ -88,15 +88,14 @@ export class FootprintTool {
     });
   }
 
-  /** If the server rejects an exact step, outlines the nearest reachable footprint for a while. */
+  /** If the server rejects a step, outlines the nearest reachable footprint for a while. */
   onEvent(pane: WorldPane, event: WorldEvent): void {
-    if (event.type === 'finished') this.exactRequests.delete(event.requestId);
-    if (event.type !== 'rejected' || !this.exactRequests.delete(event.requestId)) return;
+    if (event.type === 'finished') this.requests.delete(event.requestId);
+    if (event.type !== 'rejected' || !this.requests.delete(event.requestId)) return;
     // The server reports no nearest footprint, for example if foot planting is off.
     if (event.positionM.every((x) => x === 0)) return;
-    // The request had no heading, so the outline shows the heading of the base frame.
     this.nearestReachable = {
-      pane, atM: event.positionM, headingRad: event.baseHeadingRad,
+      pane, atM: event.positionM, headingRad: event.nearestHeadingRad,
       untilMs: performance.now() + nearestShownMs};
     this.update();
   }
@@ -199,6 +198,7 @@ export class FootprintTool {
           waypointsM,
           ...(target === null ? {} : {atM: target}),
           ...(item.exactOnly ? {exactOnly: true} : {}),
+          ...(item.allowNearest ? {allowNearest: true} : {}),
           ...(item.sideM === null ? {} : {sideM: item.sideM}),
           ...(item.headingRad === null ? {} : {headingRad: item.headingRad}),
           ...(item.speedMPerS === null ? {} : {speedMPerS: item.speedMPerS}),

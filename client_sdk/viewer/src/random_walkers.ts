@@ -92,10 +92,12 @@ export function randomMovements(
     Math.max(-0.35, Math.min(0.35, homeRad / stepsPerRequest)) : (random() - 0.5) * 0.5;
   const items: MovementRequest[] = [];
   for (let i = 0; i < stepsPerRequest; ++i) {
-    items.push({avatar, type: 'step', foot: 'auto', lengthM: 0.45 + random() * 0.25, turnRad});
+    items.push({avatar, type: 'step', foot: 'auto', lengthM: 0.45 + random() * 0.25, turnRad,
+      allowNearest: true});
   }
   if (dice > 0.93 && distanceM < homeRadiusM) {
-    items.push({avatar, type: 'jump', lengthM: 0.75 + random() * 0.3, turnRad: 0});
+    items.push({avatar, type: 'jump', lengthM: 0.75 + random() * 0.3, turnRad: 0,
+      allowNearest: true});
   }
   return items;
 }

@@ -163,8 +163,11 @@ export interface LayerRequest {
 
 /**
  * A movement to add to an avatar's queue. Fields name the types that use them; other types ignore
- * them. Absent numbers are 0 unless stated otherwise. If a step or jump is beyond what the motion
- * library can do, the avatar does the closest possible one, see `WorldEvent.applied`.
+ * them. Absent numbers are 0 unless stated otherwise.
+ *
+ * A step or jump is rejected when it is about to start if the motion library would miss its place
+ * by more than 0.2 m, or its direction or heading by more than 60 degrees. The event `rejected`
+ * contains the nearest one in reach. Smaller errors are visible in `WorldEvent.applied`.
  */
 export interface MovementRequest {
   avatar: number;
@@ -185,16 +188,15 @@ export interface MovementRequest {
   /** Step with `atM`: heading of the foot; absent: the server chooses. Walk: final heading;
    * required. */
   headingRad?: number;
-  /**
-   * Step with `atM`: what happens if the position is out of reach when the step is about to start.
-   * True: the step is rejected, and the event contains the nearest reachable position. False (the
-   * default): the foot lands at that nearest position.
-   */
+  /** Step: true rejects the step unless the foot lands exactly at its place. Default false. */
   exactOnly?: boolean;
+  /** Step, jump: true plays the nearest movement of the library, however far it is from the
+   * request. Not together with `exactOnly`. Default false. */
+  allowNearest?: boolean;
   /** Walk: positions to pass on the way, at most 64. */
   waypointsM?: readonly Vec3[];
-  /** Walk: speed, 0.05 to 5. The avatar walks as close to it as the motion library allows. Absent:
-   * a comfortable speed. */
+  /** Walk: speed, 0.05 to 5. The avatar walks as close to it as the motion library allows, see
+   * `WorldEvent.speedMPerS`. Absent: a comfortable speed. */
   speedMPerS?: number;
   /** Default `none`. */
   interrupt?: Interrupt;
@@ -233,6 +235,7 @@ export interface QueuedRequest {
   readonly speedMPerS: number | null;
   readonly interrupt: Interrupt;
   readonly exactOnly: boolean;
+  readonly allowNearest: boolean;
 }
 
 /** State of an avatar at a tick: the result of `World.inspect`. */
@@ -402,13 +405,14 @@ export interface WorldEvent {
   readonly applied: Parameters;
   /** Started: the applied parameters lie outside the range of the recorded examples. */
   readonly extrapolated: boolean;
-  /** Started: the requested parameters were limited to what is possible. */
+  /** Started: the requested parameters were limited to what is possible. Accepted: the motion
+   * library cannot walk at the requested speed. */
   readonly clamped: boolean;
   /** Finished: another request interrupted the movement before its end. */
   readonly cutShort: boolean;
-  /** Foot strike: the foot that landed. */
+  /** Foot strike: the foot that landed. Rejected step: the foot that should have moved. */
   readonly foot: Foot | null;
-  /** Foot strike: where the foot landed. Rejected because of `exactOnly`: the nearest reachable
+  /** Foot strike: where the foot landed. Rejected because it is out of reach: the nearest reachable
    * position. */
   readonly positionM: Vec3;
   /** Finished, idle, spawned: the avatar's new base frame. */
@@ -418,6 +422,21 @@ export interface WorldEvent {
   readonly code: number;
   /** Rejected: readable explanation. */
   readonly reason: string;
+  /** Rejected because it is out of reach: distance between the requested and the nearest place. */
+  readonly missedM: number;
+  /** Rejected because it is out of reach: angle between the requested and the nearest direction or
+   * heading, the larger one. */
+  readonly missedRad: number;
+  /** Rejected because it is out of reach: the nearest step or jump, as in `MovementRequest`. */
+  readonly nearestLengthM: number;
+  readonly nearestSideM: number;
+  readonly nearestHeightM: number;
+  readonly nearestTurnRad: number;
+  /** Heading of the foot at `positionM`; after a jump, of the avatar. */
+  readonly nearestHeadingRad: number;
+  /** Accepted walk: the walking speed of the library that is nearest to the requested one. End of a
+   * walk: its mean speed without the first and the last steps. 0: unknown. */
+  readonly speedMPerS: number;
 }
 
 /** Tip of a chain of joints, for example of the head or a toe. */

@@ -165,18 +165,34 @@ test('sends interrupts', async () => {
                'invalid_argument');
 });
 
-test('sends exactOnly', async () => {
+test('sends exactOnly and allowNearest', async () => {
   const h = new Harness();
   const world = h.joined();
   const step = {avatar: 1, type: 'step', atM: [1, 0, 2], exactOnly: true} as const;
-  void world.request(
-      [step, {...step, exactOnly: false}, {avatar: 1, type: 'step', atM: [1, 0, 2]}]);
+  const plain = {avatar: 1, type: 'step', lengthM: 0.5} as const;
+  void world.request([
+    step, {...step, exactOnly: false}, {avatar: 1, type: 'step', atM: [1, 0, 2]},
+    {...plain, exactOnly: true}, plain, {...plain, allowNearest: true},
+    {...step, exactOnly: false, allowNearest: true}, {avatar: 1, type: 'jump', allowNearest: true},
+    {avatar: 1, type: 'jump'}, {avatar: 1, type: 'stand'},
+  ]);
   const [sent] = h.sent();
   assert.ok(sent?.type === 'Request');
-  assert.deepEqual(sent.items.map(({exactOnly}) => exactOnly), [true, false, false]);
+  assert.deepEqual(sent.items.map(({exactOnly, allowNearest}) => [exactOnly, allowNearest]), [
+    [true, false], [false, false], [false, false], [true, false], [false, false], [false, true],
+    [false, true], [false, true], [false, false], [false, false],
+  ]);
   for (const bad of [
-    {...step, atM: undefined}, {...step, exactOnly: 1}, {...step, type: 'walk', headingRad: 0},
-    {...step, type: 'jump'},
+    {...plain, allowNearest: 'yes'}, {avatar: 1, type: 'stand', allowNearest: true},
+    {avatar: 1, type: 'walk', atM: [0, 0, 1], headingRad: 0, allowNearest: true},
+  ]) {
+    const reply = await world.request([bad as never]);
+    assert.equal(reply.status, 'invalid_argument');
+    assert.match(reply.text, /allowNearest/);
+  }
+  for (const bad of [
+    {...step, allowNearest: true}, {...step, exactOnly: 1},
+    {...step, type: 'walk', headingRad: 0}, {...step, type: 'jump'},
   ]) {
     const reply = await world.request([bad as never]);
     assert.equal(reply.status, 'invalid_argument');

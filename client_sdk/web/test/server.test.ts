@@ -356,6 +356,22 @@ test('terrain is sent to all clients, and avatars walk on it', {skip}, async () 
     await until('the foot has landed', () => strikes.length > 0);
     assert.ok(Math.hypot(strikes[0]![0]! - 0.1, strikes[0]![2]! - 0.45) < 0.01, `${strikes[0]}`);
 
+    const rejected: WorldEvent[] = [];
+    const started: bigint[] = [];
+    mine.on('event', (event) => {
+      if (event.type === 'rejected') rejected.push(event);
+      if (event.type === 'started') started.push(event.requestId);
+    });
+    const far = {avatar: 1, type: 'step', foot: 'right', lengthM: 2} as const;
+    assert.deepEqual((await mine.request([
+      {...far, requestId: 51}, {...far, requestId: 52, allowNearest: true},
+    ])).items, []);
+    await until('the second step has started', () => started.includes(52n));
+    assert.equal(rejected.length, 1);
+    const [{requestId, code, kind, foot, missedM, nearestLengthM}] = rejected as [WorldEvent];
+    assert.deepEqual([requestId, code, kind, foot], [51n, 101, 'stepRight', 'right']);
+    assert.ok(missedM > 0.2 && Math.abs(nearestLengthM + missedM - 2) < 1e-6, `${missedM}`);
+
     const arrived: (readonly number[])[] = [];
     mine.on('event', (event) => {
       if (event.type === 'finished' && event.kind === 'stand') arrived.push(event.basePositionM);

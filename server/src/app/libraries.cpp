@@ -23,6 +23,7 @@ Expected<Libraries> Libraries::Load(const Config& config) {
 
 void Libraries::Add(const std::string& name, std::shared_ptr<const MotionLibrary> library) {
   quantizations_[name] = MakePoseQuantizations(*library);
+  walk_speeds_[name] = MeasureWalkSpeeds(library);
   libraries_[name] = std::move(library);
 }
 
@@ -30,6 +31,11 @@ std::shared_ptr<const PoseQuantizations> Libraries::FindQuantizations(
     const std::string& name) const {
   const auto it = quantizations_.find(name);
   return it == quantizations_.end() ? nullptr : it->second;
+}
+
+WalkSpeeds Libraries::FindWalkSpeeds(const std::string& name) const {
+  const auto it = walk_speeds_.find(name);
+  return it == walk_speeds_.end() ? WalkSpeeds{} : it->second;
 }
 
 std::shared_ptr<const MotionLibrary> Libraries::Find(const std::string& name) const {

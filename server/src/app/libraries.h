@@ -6,6 +6,7 @@
 
 #include "base/config.h"
 #include "stridewire/base/error.h"
+#include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
 #include "world/pose_quantizations.h"
 
@@ -24,6 +25,8 @@ class Libraries {
   /// Returns the compact pose formats of a library, or null if no library has this name.
   [[nodiscard]] std::shared_ptr<const PoseQuantizations> FindQuantizations(
       const std::string& name) const;
+  /// Returns the walking speeds of a library. Unknown if no library has this name.
+  [[nodiscard]] WalkSpeeds FindWalkSpeeds(const std::string& name) const;
   [[nodiscard]] const std::map<std::string, std::shared_ptr<const MotionLibrary>>& All() const {
     return libraries_;
   }
@@ -31,6 +34,7 @@ class Libraries {
  private:
   std::map<std::string, std::shared_ptr<const MotionLibrary>> libraries_;
   std::map<std::string, std::shared_ptr<const PoseQuantizations>> quantizations_;
+  std::map<std::string, WalkSpeeds> walk_speeds_;
 };
 
 }  // namespace stridewire::server

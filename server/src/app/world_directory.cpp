@@ -43,6 +43,7 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   const std::string& library = has_library ? configured->second.library : config_.library;
   world->library = libraries_.Find(library);
   world->quantizations = libraries_.FindQuantizations(library);
+  world->walk_speeds = libraries_.FindWalkSpeeds(library);
   STRIDEWIRE_CHECK(world->library != nullptr);  // Libraries::Load has loaded all libraries.
   if (is_configured && !configured->second.terrain.empty()) {
     auto world_terrain =

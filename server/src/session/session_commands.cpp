@@ -1,5 +1,7 @@
 #include "session/session_commands.h"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
 #include <array>
 #include <iterator>
@@ -31,6 +33,18 @@ void Distribute(std::vector<Item>&& items, std::vector<Part>& parts) {
     const auto shard = static_cast<std::size_t>(ShardOf(item.avatar, shard_count));
     parts[shard].items.push_back({index++, std::move(item)});
   }
+}
+
+// Returns a note on the first walk whose speed the library cannot reach; empty if there is none.
+std::string SpeedNote(const WalkSpeeds& speeds, const std::vector<protocol::RequestItem>& items) {
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    const auto* walk = std::get_if<protocol::WalkMovement>(&items[i].movement);
+    if (walk == nullptr || !walk->speed_m_s || !speeds.IsOutside(*walk->speed_m_s)) continue;
+    return fmt::format(
+        "items[{}].speed_m_s: the library walks at {:.2f} to {:.2f} m/s, not at {:g} m/s", i,
+        speeds.slowest_m_s, speeds.fastest_m_s, *walk->speed_m_s);
+  }
+  return {};
 }
 
 // Upper bound for the size of a refused item in a Reply.
@@ -335,9 +349,10 @@ void SessionCommands::Execute(protocol::Request&& command) {
   std::vector<RequestPart> parts(static_cast<std::size_t>(context_.host.shard_count()),
                                  RequestPart{.items = {}, .over_ticks = over_ticks});
   const std::size_t item_count = command.items.size();
+  Pending pending{.item_count = item_count, .reply = {}};
+  pending.reply.text = SpeedNote(membership->world->walk_speeds, command.items);
   Distribute(std::move(command.items), parts);
-  SubmitParts(command.seq, membership->world, std::move(parts),
-              Pending{.item_count = item_count, .reply = {}});
+  SubmitParts(command.seq, membership->world, std::move(parts), std::move(pending));
 }
 
 void SessionCommands::Execute(protocol::SetLayers&& command) {

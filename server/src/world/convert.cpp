@@ -90,11 +90,11 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
             step.at = FootprintRequest{movement.at->position_m, movement.at->heading_rad};
           }
           step.exact_only = movement.exact_only;
-          step.allow_nearest = !movement.exact_only;
+          step.allow_nearest = movement.allow_nearest;
           request.movement = step;
         } else if constexpr (std::is_same_v<T, protocol::JumpMovement>) {
-          request.movement =
-              JumpRequest{movement.length_m, movement.height_m, movement.turn_rad, true};
+          request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad,
+                                         movement.allow_nearest};
         } else if constexpr (std::is_same_v<T, protocol::WalkMovement>) {
           request.movement = WalkRequest{movement.position_m, movement.heading_rad,
                                          movement.waypoints_m, movement.speed_m_s};
@@ -124,13 +124,14 @@ protocol::RequestItem ToWire(const MovementRequest& request) {
           step.turn_rad = movement.turn_rad;
           if (movement.at) {
             step = {.foot = step.foot,
-                    .at = protocol::Footprint{movement.at->position_m, movement.at->heading_rad},
-                    .exact_only = movement.exact_only};
+                    .at = protocol::Footprint{movement.at->position_m, movement.at->heading_rad}};
           }
+          step.exact_only = movement.exact_only;
+          step.allow_nearest = movement.allow_nearest;
           item.movement = step;
         } else if constexpr (std::is_same_v<T, JumpRequest>) {
-          item.movement =
-              protocol::JumpMovement{movement.length_m, movement.height_m, movement.turn_rad};
+          item.movement = protocol::JumpMovement{movement.length_m, movement.height_m,
+                                                 movement.turn_rad, movement.allow_nearest};
         } else if constexpr (std::is_same_v<T, WalkRequest>) {
           item.movement = protocol::WalkMovement{movement.position_m, movement.heading_rad,
                                                  movement.waypoints_m, movement.speed_m_s};
@@ -194,8 +195,18 @@ protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library) {
   if (event.type == AvatarEventType::kRejected) {
     wire.code = ToStatusCode(event.code);
     wire.reason = DescribeRejection(event);
-    if (event.missed) wire.position_m = event.missed->nearest.position_m;
+    if (const auto& missed = event.missed) {
+      wire.position_m = missed->nearest.position_m;
+      wire.missed_m = missed->distance_m;
+      wire.missed_rad = missed->turn_rad;
+      wire.nearest = {.length_m = missed->reached.length_m,
+                      .side_m = missed->reached.side_m,
+                      .height_m = missed->reached.height_m,
+                      .turn_rad = missed->reached.turn_rad,
+                      .heading_rad = missed->nearest.heading_rad};
+    }
   }
+  wire.speed_m_s = event.speed_m_s;
   return wire;
 }
 

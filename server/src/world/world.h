@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/messages.h"
+#include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
 #include "world/pose_quantizations.h"
 #include "world/world_terrain.h"
@@ -25,6 +26,7 @@ struct World {
   std::string name;
   std::shared_ptr<const MotionLibrary> library;
   std::shared_ptr<const PoseQuantizations> quantizations;  ///< Compact pose formats of `library`.
+  WalkSpeeds walk_speeds;                                  ///< Walking speeds of `library`.
   bool persistent = false;  ///< True if avatars outlive the session that spawned them.
   AvatarOptions avatar_options;
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.

@@ -151,7 +151,13 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
     }
     ++result.accepted;
     if (interest_.events()) {
-      AddEvent(EventType::kAccepted, asked.avatar, tick).request_id = asked.request_id;
+      protocol::Event& accepted = AddEvent(EventType::kAccepted, asked.avatar, tick);
+      accepted.request_id = asked.request_id;
+      const auto* walk = std::get_if<protocol::WalkMovement>(&asked.movement);
+      if (walk != nullptr && walk->speed_m_s) {
+        accepted.speed_m_s = world_->walk_speeds.Nearest(*walk->speed_m_s);
+        accepted.clamped = world_->walk_speeds.IsOutside(*walk->speed_m_s);
+      }
     }
   }
   metrics_.requests_accepted.Add(result.accepted);

@@ -771,8 +771,12 @@ TEST(ClientAndServer, AnExactStepOutOfReachIsRejected) {
   Daemon daemon;
   User user(daemon.port());
   user.Spawn(1);
-  EXPECT_EQ(user.client.Request(user.world, {client::ExactOnly(client::Step(1, 7, 0.5))}).status(),
-            STRIDEWIRE_INVALID_ARGUMENT);
+  for (const stridewire_movement& bad :
+       {client::ExactOnly(client::AllowNearest(client::Step(1, 7, 0.5))),
+        client::ExactOnly(client::Jump(1, 7, 0.5)), client::AllowNearest(client::Stand(1, 7, 1.0)),
+        client::AllowNearest(client::WalkTo(1, 7, {}, 0.0))}) {
+    EXPECT_EQ(user.client.Request(user.world, {bad}).status(), STRIDEWIRE_INVALID_ARGUMENT);
+  }
   ASSERT_TRUE(user.client.Request(
       user.world,
       {client::ExactOnly(client::StepTo(1, 7, {1.1, 0.0, 5.0}, 0.0, STRIDEWIRE_FOOT_LEFT)),
@@ -790,6 +794,64 @@ TEST(ClientAndServer, AnExactStepOutOfReachIsRejected) {
   ASSERT_TRUE(strike);
   EXPECT_EQ(strike->request_id, 8u);
   EXPECT_NEAR(strike->position_m[2], 0.45, 0.001);
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
+TEST(ClientAndServer, AStepOutOfReachIsRejectedUnlessTheNearestIsAllowed) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Request(
+      user.world, {client::Step(1, 7, 2.0), client::ExactOnly(client::Step(1, 8, 1.3)),
+                   client::Jump(1, 9, 4.0), client::AllowNearest(client::Step(1, 10, 2.0)),
+                   client::AllowNearest(client::Jump(1, 11, 4.0))}));
+  const auto step = user.Next(STRIDEWIRE_EVENT_REJECTED);
+  ASSERT_TRUE(step);
+  EXPECT_EQ(step->request_id, 7u);
+  EXPECT_EQ(step->status, STRIDEWIRE_OUT_OF_RANGE);
+  EXPECT_NE(step->foot, STRIDEWIRE_FOOT_AUTO);
+  EXPECT_GT(step->missed_m, 0.2);
+  EXPECT_NEAR(step->nearest_length_m + step->missed_m, 2.0, 1e-6);
+  EXPECT_GT(step->nearest_side_m, 0.05);
+  const auto exact = user.Next(STRIDEWIRE_EVENT_REJECTED);
+  ASSERT_TRUE(exact);
+  EXPECT_EQ(exact->request_id, 8u);
+  const auto jump = user.Next(STRIDEWIRE_EVENT_REJECTED);
+  ASSERT_TRUE(jump);
+  EXPECT_EQ(jump->request_id, 9u);
+  EXPECT_EQ(jump->kind, STRIDEWIRE_KIND_JUMP);
+  EXPECT_NEAR(jump->nearest_length_m + jump->missed_m, 4.0, 1e-6);
+  std::vector<std::uint64_t> started;
+  while (started.empty() || started.back() != 11) {
+    const auto event = user.Next(STRIDEWIRE_EVENT_STARTED);
+    ASSERT_TRUE(event);
+    if (event->request_id == 0) continue;
+    started.push_back(event->request_id);
+    EXPECT_EQ(event->clamped, 1);
+  }
+  EXPECT_EQ(started, (std::vector<std::uint64_t>{10, 11}));
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
+TEST(ClientAndServer, AWalkReportsItsSpeed) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(1);
+  const auto command =
+      user.client.Request(user.world, {client::WalkTo(1, 7, {1.0, 0.0, 12.0}, 0.0, 4.0)});
+  ASSERT_TRUE(command);
+  const auto accepted = user.Next(STRIDEWIRE_EVENT_ACCEPTED);
+  ASSERT_TRUE(accepted);
+  EXPECT_EQ(accepted->clamped, 1);
+  EXPECT_GT(accepted->speed_m_s, 1.0);
+  EXPECT_LT(accepted->speed_m_s, 2.5);
+  auto finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
+  while (finished && finished->kind != STRIDEWIRE_KIND_STAND) {
+    EXPECT_EQ(finished->speed_m_s, 0.0);
+    finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
+  }
+  ASSERT_TRUE(finished);
+  EXPECT_NEAR(finished->speed_m_s, accepted->speed_m_s, 0.08 * accepted->speed_m_s);
   EXPECT_EQ(daemon.Terminate(), 0);
 }
 

@@ -261,7 +261,7 @@ TEST(ServerSession, ReportsGroupAndExtrapolation) {
   ASSERT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
   // The first movement may start before the reply; the others start later.
   std::vector<protocol::RequestItem> items = Steps(1, 3, 0.3);
-  std::get<protocol::StepMovement>(items[2].movement).length_m = 5.0;
+  std::get<protocol::StepMovement>(items[2].movement) = {.length_m = 5.0, .allow_nearest = true};
   ASSERT_EQ(client.Request(world->world, items)->accepted, 3u);
 
   std::map<protocol::RequestId, protocol::Event> started;
@@ -735,6 +735,106 @@ TEST_F(ServerSessionOfOne, ReachesOrRejectsExactFootprints) {
   EXPECT_LT(rejected.position_m.z, 2.0);
   EXPECT_EQ(heard[3].request_id, 8u);
   EXPECT_NEAR(heard[2].position_m.z, 0.45, 1e-3);
+}
+
+// Requests a rejected step again in the terms of the rejection, which must then be in reach.
+TEST_F(ServerSessionOfOne, RejectsStepsAndJumpsOutOfReachUnlessTheNearestIsAllowed) {
+  using protocol::JumpMovement;
+  using protocol::StepMovement;
+  const auto hear = [&](std::vector<protocol::RequestItem> items, protocol::RequestId last) {
+    std::vector<protocol::Event> heard;
+    EXPECT_TRUE(client_.Request(world_, std::move(items)));
+    const auto is_last = [&](const protocol::Event& event) {
+      return event.request_id == last && (event.type == protocol::EventType::kRejected ||
+                                          event.type == protocol::EventType::kFinished);
+    };
+    while (std::ranges::none_of(heard, is_last)) {
+      const auto events = client_.Await<protocol::Events>();
+      if (!events) break;
+      for (const protocol::Event& event : events->events) {
+        if (event.type == protocol::EventType::kRejected ||
+            event.type == protocol::EventType::kStarted) {
+          if (event.request_id != 0) heard.push_back(event);
+        } else if (is_last(event)) {
+          heard.push_back(event);
+        }
+      }
+    }
+    return heard;
+  };
+  const auto rejected =
+      hear({{1, 7, StepMovement{.length_m = 2.0}},
+            {1, 8, JumpMovement{.length_m = 4.0}},
+            {1, 9, StepMovement{.length_m = 1.3, .exact_only = true}},
+            {1, 10, StepMovement{.at = protocol::Footprint{DVec3(0.0, 0.0, 3.0), std::nullopt}}}},
+           10);
+  ASSERT_EQ(rejected.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    SCOPED_TRACE(i);
+    EXPECT_EQ(rejected[i].type, protocol::EventType::kRejected);
+    EXPECT_EQ(rejected[i].request_id, 7 + i);
+    EXPECT_EQ(rejected[i].code, StatusCode::kOutOfRange);
+    EXPECT_GT(rejected[i].missed_m, i == 2 ? 0.001 : 0.2);
+    EXPECT_FALSE(rejected[i].reason.empty());
+  }
+  const protocol::NearestMovement step = rejected[0].nearest;
+  EXPECT_NEAR(step.length_m + rejected[0].missed_m, 2.0, 1e-6);
+  EXPECT_GT(step.side_m, 0.05);
+  const protocol::NearestMovement jump = rejected[1].nearest;
+  EXPECT_NEAR(jump.length_m + rejected[1].missed_m, 4.0, 1e-6);
+  EXPECT_EQ(jump.side_m, 0.0);
+  EXPECT_NEAR(rejected[1].position_m.z, jump.length_m, 1e-6);
+  EXPECT_LT(rejected[2].nearest.length_m, 1.3);
+  EXPECT_NEAR(rejected[3].position_m.z + rejected[3].missed_m, 3.0, 0.1);
+
+  const auto played = hear({{1, 11, StepMovement{.length_m = step.length_m}},
+                            {1, 12, StepMovement{.length_m = 2.0, .allow_nearest = true}},
+                            {1, 13, JumpMovement{.length_m = 4.0, .allow_nearest = true}},
+                            {1, 14, JumpMovement{.length_m = jump.length_m}}},
+                           14);
+  ASSERT_EQ(played.size(), 5u);
+  for (std::size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(played[i].type, protocol::EventType::kStarted);
+    EXPECT_EQ(played[i].request_id, 11 + i);
+  }
+  EXPECT_TRUE(played[1].clamped && played[2].clamped);
+}
+
+TEST_F(ServerSessionOfOne, ReportsWalkingSpeedsThatTheLibraryDoesNotHave) {
+  const auto walk = [](double z_m, std::optional<double> speed_m_s) {
+    return protocol::WalkMovement{DVec3(0.0, 0.0, z_m), 0.0, {}, speed_m_s};
+  };
+  const auto reply = client_.Request(
+      world_, {{1, 7, walk(1.0, std::nullopt)}, {1, 8, walk(7.0, 0.7)}, {1, 9, walk(13.0, 4.0)}});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->code, StatusCode::kOk);
+  EXPECT_EQ(reply->accepted, 3u);
+  EXPECT_TRUE(reply->items.empty());
+  EXPECT_TRUE(reply->text.starts_with("items[2].speed_m_s: the library walks at ")) << reply->text;
+  std::map<protocol::RequestId, protocol::Event> accepted;
+  std::map<protocol::RequestId, protocol::Event> arrived;
+  while (arrived.size() < 3) {
+    const auto events = client_.Await<protocol::Events>();
+    ASSERT_TRUE(events);
+    for (const protocol::Event& event : events->events) {
+      ASSERT_NE(event.type, protocol::EventType::kRejected) << event.reason;
+      if (event.type == protocol::EventType::kAccepted) accepted[event.request_id] = event;
+      if (event.type == protocol::EventType::kFinished &&
+          event.kind == protocol::MovementKind::kStand) {
+        arrived[event.request_id] = event;
+      }
+    }
+  }
+  EXPECT_EQ(accepted[7].speed_m_s, 0.0);
+  EXPECT_EQ(accepted[8].speed_m_s, 0.7);
+  EXPECT_FALSE(accepted[8].clamped);
+  EXPECT_TRUE(accepted[9].clamped);
+  const double fastest_m_s = accepted[9].speed_m_s;
+  EXPECT_GT(fastest_m_s, 0.8);
+  EXPECT_LT(fastest_m_s, 2.5);
+  EXPECT_EQ(arrived[7].speed_m_s, 0.0) << "too few steps";
+  EXPECT_NEAR(arrived[8].speed_m_s, 0.7, 0.07);
+  EXPECT_NEAR(arrived[9].speed_m_s, fastest_m_s, 0.05 * fastest_m_s);
 }
 
 TEST(ServerSession, AcceptsLayersOnlyWithTheirFeature) {

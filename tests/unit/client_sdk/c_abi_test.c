@@ -9,7 +9,7 @@
 #define OFFSET(type, field, bytes) \
   _Static_assert(offsetof(type, field) == (bytes), "offset of " #type "." #field)
 
-_Static_assert(STRIDEWIRE_ABI_VERSION == 3, "the numbers below belong to this version");
+_Static_assert(STRIDEWIRE_ABI_VERSION == 4, "the numbers below belong to this version");
 
 #if UINTPTR_MAX == UINT64_MAX
 
@@ -56,6 +56,7 @@ OFFSET(stridewire_movement, has_speed, 120);
 OFFSET(stridewire_movement, speed_m_s, 128);
 OFFSET(stridewire_movement, interrupt, 136);
 OFFSET(stridewire_movement, exact_only, 140);
+OFFSET(stridewire_movement, allow_nearest, 141);
 
 SIZE(stridewire_height_field, 40);
 OFFSET(stridewire_height_field, origin_m, 0);
@@ -114,7 +115,7 @@ OFFSET(stridewire_parameters, values, 0);
 OFFSET(stridewire_parameters, names, 56);
 OFFSET(stridewire_parameters, count, 63);
 
-SIZE(stridewire_event, 448);
+SIZE(stridewire_event, 512);
 OFFSET(stridewire_event, type, 0);
 OFFSET(stridewire_event, status, 4);
 OFFSET(stridewire_event, command, 8);
@@ -142,6 +143,14 @@ OFFSET(stridewire_event, dropped_batches, 264);
 OFFSET(stridewire_event, dropped_events, 272);
 OFFSET(stridewire_event, events_dropped_before, 280);
 OFFSET(stridewire_event, text, 288);
+OFFSET(stridewire_event, missed_m, 448);
+OFFSET(stridewire_event, missed_rad, 456);
+OFFSET(stridewire_event, nearest_length_m, 464);
+OFFSET(stridewire_event, nearest_side_m, 472);
+OFFSET(stridewire_event, nearest_height_m, 480);
+OFFSET(stridewire_event, nearest_turn_rad, 488);
+OFFSET(stridewire_event, nearest_heading_rad, 496);
+OFFSET(stridewire_event, speed_m_s, 504);
 
 SIZE(stridewire_joint, 84);
 OFFSET(stridewire_joint, name, 0);

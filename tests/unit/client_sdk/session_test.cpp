@@ -470,6 +470,46 @@ TEST_F(SessionTest, SendsExactFootprints) {
   EXPECT_EQ(std::get<protocol::Request>(sent[0]).items, request.items);
 }
 
+TEST_F(SessionTest, ReportsWhatARejectedStepMissed) {
+  const stridewire_world world = Joined();
+  (void)Events();
+  protocol::Event rejected{.type = protocol::EventType::kRejected,
+                           .avatar = 41,
+                           .request_id = 9,
+                           .kind = protocol::MovementKind::kStepRight,
+                           .foot = protocol::FootSide::kRight,
+                           .position_m = DVec3(1.0, 0.0, 2.0),
+                           .code = protocol::StatusCode::kOutOfRange,
+                           .reason = "the step is out of reach",
+                           .missed_m = 0.5,
+                           .missed_rad = 0.25,
+                           .nearest = {.length_m = 0.75,
+                                       .side_m = 0.125,
+                                       .height_m = -0.5,
+                                       .turn_rad = 0.375,
+                                       .heading_rad = 1.5}};
+  protocol::Event arrived{
+      .type = protocol::EventType::kFinished, .avatar = 41, .request_id = 10, .speed_m_s = 1.25};
+  Receive(protocol::Events{5, 1, 100, {rejected, arrived}});
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].type, STRIDEWIRE_EVENT_REJECTED);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_OUT_OF_RANGE);
+  EXPECT_EQ(events[0].world, world);
+  EXPECT_EQ(events[0].foot, STRIDEWIRE_FOOT_RIGHT);
+  EXPECT_EQ(events[0].position_m[2], 2.0);
+  EXPECT_EQ(events[0].missed_m, 0.5);
+  EXPECT_EQ(events[0].missed_rad, 0.25);
+  EXPECT_EQ(events[0].nearest_length_m, 0.75);
+  EXPECT_EQ(events[0].nearest_side_m, 0.125);
+  EXPECT_EQ(events[0].nearest_height_m, -0.5);
+  EXPECT_EQ(events[0].nearest_turn_rad, 0.375);
+  EXPECT_EQ(events[0].nearest_heading_rad, 1.5);
+  EXPECT_EQ(events[0].speed_m_s, 0.0);
+  EXPECT_EQ(events[1].speed_m_s, 1.25);
+  EXPECT_EQ(events[1].missed_m, 0.0);
+}
+
 TEST_F(SessionTest, SendsPlanting) {
   const stridewire_world world = Joined();
   EXPECT_EQ(session_->SetPlanting(world, {0, 0, {4, 5}, false}, command_), STRIDEWIRE_OK);

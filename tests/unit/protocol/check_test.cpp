@@ -522,15 +522,20 @@ TEST(Check, AvatarState) {
       "AvatarState.queue.request_id", 1);
 }
 
-TEST(Check, ExactOnlyNeedsAFootprint) {
+TEST(Check, ExactOnlyExcludesAllowNearest) {
   Request message{1, 1, {{1, 1, StepMovement{.at = Footprint{}, .exact_only = true}}}};
   EXPECT_TRUE(Check(message).has_value());
-  std::get<StepMovement>(message.items[0].movement).at.reset();
+  auto& step = std::get<StepMovement>(message.items[0].movement);
+  step.at.reset();
+  EXPECT_TRUE(Check(message).has_value());
+  step.allow_nearest = true;
   const Status status = Check(message);
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
-  EXPECT_EQ(status.error().where, "Request.items.at_m");
-  EXPECT_STREQ(status.error().text, "must_be_met requires at_m");
+  EXPECT_EQ(status.error().where, "Request.items.must_be_met");
+  EXPECT_STREQ(status.error().text, "must_be_met excludes allow_nearest");
+  step.exact_only = false;
+  EXPECT_TRUE(Check(message).has_value());
 }
 
 TEST(Check, Footprints) {

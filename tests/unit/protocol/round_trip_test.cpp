@@ -56,6 +56,38 @@ TEST(Messages, AreAppendedToOneBuffer) {
   }
 }
 
+// A request without must_be_near comes from a client that does not know the field. It gets the
+// nearest movement, as before.
+TEST(Messages, RequestsAllowTheNearestMovementOnlyIfTheyDoNotSayOtherwise) {
+  for (const bool exact_only : {false, true}) {
+    for (const bool allow_nearest : {false, true}) {
+      if (exact_only && allow_nearest) continue;
+      SCOPED_TRACE(testing::Message() << exact_only << " " << allow_nearest);
+      const Request sent{
+          1,
+          1,
+          {{1, 1, StepMovement{.exact_only = exact_only, .allow_nearest = allow_nearest}},
+           {1, 2, JumpMovement{.length_m = 1.0, .allow_nearest = allow_nearest}}}};
+      const auto received = Decode(EncodeOrFail(sent), MessageType::kRequest);
+      ASSERT_TRUE(received);
+      EXPECT_TRUE(SameMessage(sent, *received));
+    }
+  }
+  int steps = 0;
+  for (const SampleMessage& sample : SampleMessages()) {
+    if (sample.name != "request_footprints" && sample.name != "request_refusals") continue;
+    const auto old = Decode(EncodeOrFail(sample.message), MessageType::kRequest);
+    ASSERT_TRUE(old);
+    for (const RequestItem& item : std::get<Request>(*old).items) {
+      const auto* step = std::get_if<StepMovement>(&item.movement);
+      if (step == nullptr) continue;
+      ++steps;
+      EXPECT_EQ(step->allow_nearest, !step->exact_only);
+    }
+  }
+  EXPECT_EQ(steps, 5);
+}
+
 TEST(Messages, APoseBatchBorrowsItsFrame) {
   for (const SampleMessage& sample : SampleMessages()) {
     const auto* batch = std::get_if<PoseBatch>(&sample.message);

@@ -50,7 +50,7 @@ extern "C" {
 #endif
 
 /// Version of the struct layouts in this header. stridewire_client_create rejects other versions.
-#define STRIDEWIRE_ABI_VERSION 3
+#define STRIDEWIRE_ABI_VERSION 4
 
 /// Returns the version of the library, for example "0.1.0".
 const char* stridewire_version(void);
@@ -245,17 +245,26 @@ typedef struct stridewire_movement {
   const double* waypoints_m;
   size_t waypoint_count;  ///< Walk: number of waypoints, at most STRIDEWIRE_MAX_WAYPOINTS.
   uint8_t has_speed;      ///< Walk: 1 uses `speed_m_s`, 0 leaves the speed to the server.
-  /// Walk with `has_speed`: speed, 0.05 to 5. The server comes as close as the library allows.
+  /// Walk with `has_speed`: speed, 0.05 to 5. The server comes as close as the library allows, see
+  /// `speed_m_s` of stridewire_event.
   double speed_m_s;
   stridewire_interrupt interrupt;
-  /// Step with `has_at`: 1 rejects the step if `at_m` is out of reach; 0 steps to the nearest point
-  /// in reach instead.
+  /// Step: 1 rejects the step unless the foot lands exactly at its place. Not together with
+  /// `allow_nearest`.
   uint8_t exact_only;
+  /// Step, jump: 1 plays the nearest movement of the library, however far it is from the request. 0
+  /// rejects the request if its place would be missed by more than 0.2 m, or its direction or
+  /// heading by more than 60 degrees.
+  uint8_t allow_nearest;
 } stridewire_movement;
 
 /// Requests movements. An avatar may appear several times and executes its movements in order.
 /// Steps of a walk appear in events with the request id of the walk. A walk ends with FINISHED of
-/// kind STAND when the avatar has arrived, or with REJECTED if it cannot continue.
+/// kind STAND when the avatar has arrived, or with REJECTED if it cannot continue. Steps and jumps
+/// that are out of reach end with REJECTED, which contains the nearest one in reach.
+///
+/// If the library cannot walk at a requested speed, REPLY has the status OK and a `text` that
+/// states the possible speeds, and ACCEPTED has `clamped` and the nearest of them.
 stridewire_status stridewire_client_request(stridewire_client* client, stridewire_world world,
                                             const stridewire_movement* movements, size_t count,
                                             uint64_t* command);
@@ -437,16 +446,20 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_TERRAIN = 11,
 
   // Events about an avatar. All of them also use world, avatar, tick and time_s.
-  STRIDEWIRE_EVENT_ACCEPTED = 32,  ///< Uses request_id. The server has queued the request.
+  /// Uses request_id, and of a walk with a speed also clamped, speed_m_s. The server has queued the
+  /// request.
+  STRIDEWIRE_EVENT_ACCEPTED = 32,
   /// Uses request_id, kind, group, requested, applied, extrapolated, clamped. A movement has
   /// started.
   STRIDEWIRE_EVENT_STARTED = 33,
   STRIDEWIRE_EVENT_FOOT_STRIKE = 34,  ///< Uses foot, position_m. A foot has landed.
-  /// Uses request_id, kind, base, cut_short. A movement has ended. `base` is the new base frame.
+  /// Uses request_id, kind, base, cut_short, and at the end of a walk also speed_m_s. A movement
+  /// has ended. `base` is the new base frame.
   STRIDEWIRE_EVENT_FINISHED = 35,
   STRIDEWIRE_EVENT_IDLE = 36,  ///< Uses base. The avatar stands and its queue is empty.
-  /// Uses request_id, status, text. The avatar could not execute a queued request. If `exact_only`
-  /// was the reason, also uses foot, kind and position_m, the nearest point in reach.
+  /// Uses request_id, status, text. The avatar could not execute a queued request. If a step or
+  /// jump is out of reach (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point in
+  /// reach), missed_m, missed_rad and nearest_*. At the end of a walk, also uses speed_m_s.
   STRIDEWIRE_EVENT_REJECTED = 37,
   STRIDEWIRE_EVENT_SPAWNED = 38,  ///< base
   STRIDEWIRE_EVENT_REMOVED = 39,
@@ -489,8 +502,10 @@ typedef struct stridewire_event {
   int32_t group;         ///< Index of the motion group in the library, or -1.
   uint8_t resumed;       ///< 1: the session survived the reconnect.
   uint8_t extrapolated;  ///< 1: `applied` lies outside the range of the examples.
-  uint8_t clamped;       ///< 1: `applied` differs from `requested`, which is out of reach.
-  uint8_t cut_short;     ///< 1: another request interrupted the movement.
+  /// 1: `applied` differs from `requested`, which is out of reach. ACCEPTED: the library cannot
+  /// walk at the requested speed.
+  uint8_t clamped;
+  uint8_t cut_short;  ///< 1: another request interrupted the movement.
   double position_m[3];
   double base_position_m[3];
   double base_heading_rad;
@@ -501,6 +516,18 @@ typedef struct stridewire_event {
   uint64_t dropped_events;          ///< Event messages that the server has dropped since the join.
   uint64_t events_dropped_before;  ///< Events that the full queue dropped directly before this one.
   char text[STRIDEWIRE_MAX_TEXT_BYTES];
+  double missed_m;  ///< Distance between the requested place and the nearest one in reach, metres.
+  /// Angle between the requested and the nearest direction or heading, the larger one.
+  double missed_rad;
+  /// The nearest step or jump in reach, in the terms of stridewire_movement.
+  double nearest_length_m;
+  double nearest_side_m;
+  double nearest_height_m;
+  double nearest_turn_rad;
+  double nearest_heading_rad;  ///< Heading of the foot at `position_m`, or of the avatar (jump).
+  /// ACCEPTED: the walking speed of the library that is nearest to the requested one. End of a
+  /// walk: its mean speed without the first and the last steps. 0: unknown.
+  double speed_m_s;
 } stridewire_event;
 
 /// Moves up to `capacity` of the oldest events from the queue to `events`. `count` receives the

@@ -71,10 +71,17 @@ inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id
   m.heading_rad = heading_rad.value_or(0.0);
   return m;
 }
-/// Changes a step request such that the server rejects it if its position is out of reach.
-inline stridewire_movement ExactOnly(stridewire_movement step_to) {
-  step_to.exact_only = 1;
-  return step_to;
+/// Changes a step request such that the server rejects it unless the foot lands exactly at its
+/// place.
+inline stridewire_movement ExactOnly(stridewire_movement step) {
+  step.exact_only = 1;
+  return step;
+}
+/// Changes a request for a step or jump such that the server plays the nearest movement of its
+/// library, however far that is from the request.
+inline stridewire_movement AllowNearest(stridewire_movement movement) {
+  movement.allow_nearest = 1;
+  return movement;
 }
 /// Changes a request such that it interrupts the current movement and drops the queue.
 inline stridewire_movement Now(stridewire_movement movement) {

@@ -353,7 +353,9 @@ function queueText(item: QueuedRequest): string {
   if (item.type === 'stand') return `Stand, ${item.seconds.toFixed(1)} s`;
   if (item.type === 'walk') return `Walk to ${pointText(item.atM!)}`;
   const foot = item.foot !== 'auto' ? `, ${item.foot} foot` : '';
-  if (item.atM) return `Step${foot} to ${pointText(item.atM)}`;
+  const exact = item.exactOnly ? ', exact' : '';
+  if (item.atM) return `Step${foot} to ${pointText(item.atM)}${exact}`;
   const turn = item.turnRad ? `, turn ${degrees(item.turnRad)}` : '';
-  return `${item.type === 'jump' ? 'Jump' : 'Step'}${foot}, ${item.lengthM.toFixed(2)} m${turn}`;
+  const type = item.type === 'jump' ? 'Jump' : 'Step';
+  return `${type}${foot}, ${item.lengthM.toFixed(2)} m${turn}${exact}`;
 }

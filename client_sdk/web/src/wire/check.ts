@@ -122,11 +122,18 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
       const at = walk || (step && item.atM !== undefined) ? vector(item.atM, 'atM', i) : null;
       const moves = type !== 'stand' && at === null;
       const exactOnly = item.exactOnly ?? false;
+      const allowNearest = item.allowNearest ?? false;
       if (typeof exactOnly !== 'boolean') {
         throw new Malformed('expected true or false', 'exactOnly', i);
       }
-      if (exactOnly && !(step && at !== null)) {
-        throw new Malformed('is only allowed for a step with atM', 'exactOnly', i);
+      if (typeof allowNearest !== 'boolean') {
+        throw new Malformed('expected true or false', 'allowNearest', i);
+      }
+      if (exactOnly && (!step || allowNearest)) {
+        throw new Malformed('is only allowed for a step without allowNearest', 'exactOnly', i);
+      }
+      if (allowNearest && !step && type !== 'jump') {
+        throw new Malformed('is only allowed for a step or jump', 'allowNearest', i);
       }
       return {
         avatar: avatarNumber(item.avatar, 1, 'avatar', i),
@@ -146,6 +153,7 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
             ? finite(item.speedMPerS, 'speedMPerS', i) : null,
         interrupt: oneOf(enums.Takeover, item.interrupt ?? 'none', 'interrupt', i),
         exactOnly,
+        allowNearest,
       };
     }),
   };

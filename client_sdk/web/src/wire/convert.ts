@@ -14,7 +14,9 @@ export function terrainOf(from: TerrainInfo | null): Terrain | null {
 }
 
 export function eventOf(event: Event): WorldEvent {
-  return event.type === 'footStrike' ? event : {...event, foot: null};
+  const isRejectedStep =
+      event.type === 'rejected' && (event.kind === 'stepLeft' || event.kind === 'stepRight');
+  return event.type === 'footStrike' || isRejectedStep ? event : {...event, foot: null};
 }
 
 export function avatarStateOf(message: AvatarStateMessage): AvatarState {

@@ -64,7 +64,8 @@ export const rules = {
     if (m.type === 'walk' && (m.atM === null || m.headingRad === null)) {
       fail('a walk requires atM and headingRad', 'atM');
     }
-    if (m.exactOnly && m.atM === null) fail('is missing, but mustBeMet is set', 'atM');
+    // mustBeMet includes mustBeNear, and other types do not use it.
+    if (m.exactOnly || (m.type !== 'step' && m.type !== 'jump')) m.allowNearest = false;
     if (m.atM === null) {
       m.headingRad = null;
     } else {

@@ -14,6 +14,10 @@ const u64 = (value: bigint | number): Json => String(value);
 const token = (bytes: Uint8Array): Json => Buffer.from(bytes).toString('hex');
 const vec3 = (v: Vec3): Json => [...v];
 
+function nonZero(numbers: {[name: string]: number}): {[name: string]: Json} {
+  return Object.fromEntries(Object.entries(numbers).filter(([, value]) => value !== 0));
+}
+
 function parameters(set: Parameters): Json {
   return parameterList(set);
 }
@@ -22,21 +26,23 @@ function request(item: QueuedRequest): Json {
   const type = enums.MovementType.indexOf(item.type);
   const common = {avatar: item.avatar, request_id: u64(item.requestId), type,
     takeover: enums.Takeover.indexOf(item.interrupt)};
+  const near = item.allowNearest || item.exactOnly ? {} : {must_be_near: true};
   switch (item.type) {
     case 'step':
       if (item.atM !== null) {
         return {
           ...common, foot: enums.FootChoice.indexOf(item.foot), at_m: vec3(item.atM),
-          heading_rad: item.headingRad, must_be_met: item.exactOnly,
+          heading_rad: item.headingRad, must_be_met: item.exactOnly, ...near,
         };
       }
       return {
         ...common, foot: enums.FootChoice.indexOf(item.foot), length_m: item.lengthM,
         side_m: item.sideM, height_m: item.heightM, turn_rad: item.turnRad,
+        ...(item.exactOnly ? {must_be_met: true} : {}), ...near,
       };
     case 'jump':
       return {
-        ...common, length_m: item.lengthM, height_m: item.heightM, turn_rad: item.turnRad
+        ...common, length_m: item.lengthM, height_m: item.heightM, turn_rad: item.turnRad, ...near,
       };
     case 'stand': return {...common, seconds: item.seconds};
     case 'walk':
@@ -210,6 +216,12 @@ export function toJson(m: Message): {[name: string]: Json} {
           foot: e.foot === 'right' ? 1 : 0,
           position_m: vec3(e.positionM), base_position_m: vec3(e.basePositionM),
           base_heading_rad: e.baseHeadingRad, code: e.code, reason: e.reason,
+          ...nonZero({
+            missed_m: e.missedM, missed_rad: e.missedRad, nearest_length_m: e.nearestLengthM,
+            nearest_side_m: e.nearestSideM, nearest_height_m: e.nearestHeightM,
+            nearest_turn_rad: e.nearestTurnRad, nearest_heading_rad: e.nearestHeadingRad,
+            speed_m_s: e.speedMPerS,
+          }),
         })),
       };
     case 'Lagging':

@@ -54,9 +54,13 @@ struct StepMovement {
   double turn_rad = 0.0;  ///< Change of heading.
   /// Target of the foot. If present, length, side, height and turn are not encoded.
   std::optional<Footprint> at;
-  /// Only with `at`. True: if `at` is out of reach when the step is about to start, the step is
-  /// rejected.
+  /// True: if the foot cannot land exactly at its place when the step is about to start, the step
+  /// is rejected.
   bool exact_only = false;
+  /// False: if the step is out of reach when it is about to start (STANDARD.md, "Request"), it is
+  /// rejected. True: the server plays the nearest one instead. On the wire, the field
+  /// `must_be_near` is the opposite. Excludes `exact_only`.
+  bool allow_nearest = false;
   bool operator==(const StepMovement&) const = default;
 };
 
@@ -65,6 +69,7 @@ struct JumpMovement {
   double length_m = 0.0;
   double height_m = 0.0;
   double turn_rad = 0.0;
+  bool allow_nearest = false;  ///< As in StepMovement.
   bool operator==(const JumpMovement&) const = default;
 };
 
@@ -91,6 +96,17 @@ struct RequestItem {
   std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
   Interrupt interrupt = Interrupt::kNone;
   bool operator==(const RequestItem&) const = default;
+};
+
+/// The step or jump in reach that is nearest to a rejected one. The foot of a step, or the middle
+/// between the feet of a jump, would land at Event::position_m.
+struct NearestMovement {
+  double length_m = 0.0;     ///< As in StepMovement or JumpMovement.
+  double side_m = 0.0;       ///< As in StepMovement; 0 for jumps.
+  double height_m = 0.0;     ///< As in StepMovement or JumpMovement.
+  double turn_rad = 0.0;     ///< As in StepMovement or JumpMovement.
+  double heading_rad = 0.0;  ///< Heading of the foot, or of the avatar after a jump.
+  bool operator==(const NearestMovement&) const = default;
 };
 
 /// Flag of an avatar in a batch: do not interpolate from its previous pose. Receivers ignore
