@@ -5,7 +5,7 @@ The strip shows the figure from its right side. The view from above shows standi
 toe tip (left orange, right blue) and the paths of ankles and pelvis. Writes SVG with gnuplot.
 
     draw_steps.py STEPS.bvh OUT.svg [--every 0.25] [--from 0] [--to 60] [--front] [--gap 0.35]
-                  [--ground Z,Y,Z,Y,...|feet] [--title TEXT]
+                  [--film] [--ground Z,Y,Z,Y,...|feet] [--title TEXT]
 """
 import argparse
 import math
@@ -25,6 +25,8 @@ def main():
     parser.add_argument("--from", dest="begin", type=float, default=0.0)
     parser.add_argument("--to", dest="end", type=float, default=1e9)
     parser.add_argument("--front", action="store_true", help="show the figure from the front")
+    parser.add_argument("--film", action="store_true",
+                        help="show the poses one beside the other, from slightly above")
     parser.add_argument("--gap", type=float, default=0.0, help="extra metres between poses")
     parser.add_argument("--ground", default="",
                         help="ground profile Z,Y,Z,Y,... or 'feet', which draws treads from 14 cm "
@@ -45,14 +47,17 @@ def main():
     blocks = [[], [], []]
     shown = list(range(0, len(frames), max(1, round(options.every / step_s))))
     axis, sign = (0, -1.0) if options.front else (2, 1.0)
-    across = []
+    across, heights = [], []
     for count, f in enumerate(shown):
+        root = frames[f][0] if options.film else (0.0, 0.0, 0.0)
+        gap, above = (0.75, 0.3) if options.film else (options.gap, 0.0)
         for k, (name, parent, _, _) in enumerate(joints):
             if parent < 0:
                 continue
-            ends = [(sign * p[axis] + options.gap * count, p[1])
+            ends = [(sign * (p[axis] - root[axis]) + gap * count, p[1] + above * (p[0] - root[0]))
                     for p in (frames[f][parent], frames[f][k])]
             across += [ends[0][0], ends[1][0]]
+            heights += [ends[0][1], ends[1][1]]
             blocks[side(name)].append("\n".join(f"{x:.4f} {y:.4f}" for x, y in ends) + "\n")
     script = [f"${n} << EOD\n" + "\n".join(block) + "\nEOD"
               for n, block in zip(("left", "right", "middle"), blocks)]
@@ -96,7 +101,6 @@ def main():
     profile = list(zip(numbers[::2], numbers[1::2])) or [(min(across) - 1, 0), (max(across) + 1, 0)]
     script.append("$ground << EOD\n" + "\n".join(f"{z} {y}" for z, y in profile) + "\nEOD")
 
-    heights = [p[1] for f in shown for p in frames[f]]
     xs = [-p[k][0] for p in frames for k in (0, index["LeftFoot"], index["RightFoot"])]
     zs = [p[k][2] for p in frames for k in (0, index["LeftFoot"], index["RightFoot"])]
     width, height = max(across) - min(across) + 0.4, max(heights) - min(heights) + 0.4
