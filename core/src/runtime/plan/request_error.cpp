@@ -37,31 +37,32 @@ RequestTarget StepResult(const MotionLibrary& library, const RequestPlan& plan, 
 RequestError StepError(const MotionLibrary& library, const RequestPlan& plan, const FootState& feet,
                        const LandingConditions& conditions) {
   const Foot moving = MovingFoot(library.group(plan.group).kind);
-  RequestTarget asked = plan.target;
+  RequestTarget requested = plan.target;
   RequestError error{.reached = StepResult(library, plan, moving)};
   RequestTarget& reached = error.reached;
-  if (!plan.is_side_given) asked.vector_m.x = reached.vector_m.x;
-  if (conditions.has_terrain) asked.vector_m.y = reached.vector_m.y = 0.0;
+  if (!plan.is_side_given) requested.vector_m.x = reached.vector_m.x;
+  if (conditions.has_terrain) requested.vector_m.y = reached.vector_m.y = 0.0;
   if (conditions.plants_feet) {
-    reached.turn_rad += std::clamp(asked.turn_rad - reached.turn_rad, -plan.max_extra_turn_rad,
+    reached.turn_rad += std::clamp(requested.turn_rad - reached.turn_rad, -plan.max_extra_turn_rad,
                                    plan.max_extra_turn_rad);
   }
 
   // Landing places relative to the fixed foot, in the heading at the start.
-  const DVec3 asked_m = RotateYaw(asked.turn_rad, asked.vector_m);
+  const DVec3 requested_m = RotateYaw(requested.turn_rad, requested.vector_m);
   DVec3 reached_m = RotateYaw(reached.turn_rad, reached.vector_m);
-  DVec3 missed_m = reached.vector_m - asked.vector_m;
-  double turn_error_rad = std::fabs(reached.turn_rad - asked.turn_rad);
+  DVec3 missed_m = reached.vector_m - requested.vector_m;
+  double turn_error_rad = std::fabs(reached.turn_rad - requested.turn_rad);
   if (plan.exact) {
-    missed_m = reached_m - asked_m;
+    missed_m = reached_m - requested_m;
     if (conditions.plants_feet) {  // Planting moves and turns the foot to the footprint.
       const double length_m = Horizontal(missed_m);
-      const double rest = std::max(0.0, length_m - plan.most_residual_m) / std::max(length_m, 1e-9);
-      missed_m.x *= rest;
-      missed_m.z *= rest;
+      const double remaining =
+          std::max(0.0, length_m - plan.most_residual_m) / std::max(length_m, 1e-9);
+      missed_m.x *= remaining;
+      missed_m.z *= remaining;
       turn_error_rad = std::max(0.0, turn_error_rad - kMaxFootTurnRad);
     }
-    reached_m = asked_m + missed_m;
+    reached_m = requested_m + missed_m;
     reached.vector_m = RotateYaw(-reached.turn_rad, reached_m);
   }
   error.distance_m = std::sqrt(glm::dot(missed_m, missed_m));
@@ -69,7 +70,7 @@ RequestError StepError(const MotionLibrary& library, const RequestPlan& plan, co
   if (error.distance_m > kSamePlaceM) {
     const DVec3 start_m = feet.Vector(moving);
     error.angle_rad =
-        std::max(error.angle_rad, DirectionError(asked_m - start_m, reached_m - start_m));
+        std::max(error.angle_rad, DirectionError(requested_m - start_m, reached_m - start_m));
   }
   return error;
 }
@@ -81,18 +82,18 @@ RequestError JumpError(const MotionLibrary& library, const RequestPlan& plan,
     const int l = group.FindParameter(name);
     return l < 0 ? 0.0 : plan.applied.values[static_cast<std::size_t>(l)];
   };
-  DVec3 asked_m = plan.target.vector_m;
+  DVec3 requested_m = plan.target.vector_m;
   RequestError error;
   error.reached = {
       .vector_m = {0.0, applied_or_0(ParameterName::kHeight), applied_or_0(ParameterName::kLength)},
       .turn_rad = NaturalTurn(group, plan.applied)};
   DVec3& reached_m = error.reached.vector_m;
-  if (conditions.has_terrain) asked_m.y = reached_m.y = 0.0;
-  const DVec3 missed_m = reached_m - asked_m;
+  if (conditions.has_terrain) requested_m.y = reached_m.y = 0.0;
+  const DVec3 missed_m = reached_m - requested_m;
   error.distance_m = std::sqrt(glm::dot(missed_m, missed_m));
   error.angle_rad = std::fabs(error.reached.turn_rad - plan.target.turn_rad);
   if (error.distance_m > kSamePlaceM) {
-    error.angle_rad = std::max(error.angle_rad, DirectionError(asked_m, reached_m));
+    error.angle_rad = std::max(error.angle_rad, DirectionError(requested_m, reached_m));
   }
   return error;
 }
