@@ -214,20 +214,20 @@ std::vector<std::string> DescribeCompletion(const Completion& completion) {
   }
   if (completion.only_foot) {
     sentences.push_back(
-        Text("They contain steps of the %s foot only: add the option --mirror to the build to use "
-             "their mirror images for the other foot.",
+        Text("The captures contain steps of the %s foot only: add the option --mirror to the build "
+             "to use their mirror images for the other foot.",
              *completion.only_foot == Foot::kLeft ? "left" : "right"));
   }
   if (completion.has_generic_strides) {
     sentences.emplace_back(
-        "They contain no level steps straight ahead, so the generated steps "
-        "follow those of the generated figure.");
+        "The captures contain no level steps straight ahead, so the generated steps follow those "
+        "of the library builtin.");
   }
   if (completion.example_count > 0) {
-    sentences.push_back(
-        Text("The builder completed them with %d generated steps in the posture and cadence of the "
-             "captures, which are used only where no captured step fits. --no-complete omits them.",
-             completion.example_count));
+    sentences.push_back(Text(
+        "The builder added %d generated steps in the posture and cadence of the captures. They "
+        "are used only where no captured step fits. --no-complete omits them.",
+        completion.example_count));
   }
   return sentences;
 }
