@@ -1,6 +1,6 @@
-// Walks to a place at the top of a flight of stairs and back down, with seeded rises and treads.
-// The test compares what people keep on stairs: how high a foot swings, how far knees bend and how
-// fast, and how abruptly the pelvis rises and falls.
+// Walks to a place at the top of a flight of stairs and back down, with random rises and treads.
+// The test measures how high feet swing, how far and how fast knees bend, and how abruptly the
+// pelvis rises and falls, and compares each with a limit derived from people.
 
 #include <gtest/gtest.h>
 
@@ -19,15 +19,15 @@ namespace {
 
 constexpr double kFps = 60.0;
 
-// Largest values that captures of people on blocks and stairs support.
-constexpr double kMostSwingM = 0.2;  // Above the higher one of the two footprints.
-constexpr double kMostKneeDeg = 120.0;
-constexpr double kMostKneeDegPerS = 800.0;
-constexpr double kMostAcceleration = 17.0;       // Of the pelvis, vertical, in m/s².
-constexpr double kMostUsualAcceleration = 10.0;  // The same in 99 % of all frames.
+// Limits derived from captures of people on blocks and stairs.
+constexpr double kMaxSwingM = 0.2;  // Above the higher one of the two footprints.
+constexpr double kMaxKneeDeg = 120.0;
+constexpr double kMaxKneeDegPerS = 800.0;
+constexpr double kMaxAcceleration = 17.0;       // Of the pelvis, vertical, in m/s².
+constexpr double kMaxUsualAcceleration = 10.0;  // The same in 99 % of all frames.
 constexpr std::size_t kAveragedFrames = 5;
 // People take one tread at a time, however low it is.
-constexpr double kMostClimbM = 0.18;
+constexpr double kMaxClimbM = 0.18;
 
 struct Flight {
   double rise_m;
@@ -61,7 +61,8 @@ Synthesis WalkUpAndDown(const std::shared_ptr<const MotionLibrary>& library, con
       .value();
 }
 
-struct Looks {
+// Largest values during a walk up and down.
+struct StairsMotion {
   double swing_m = 0.0;
   double knee_deg = 0.0;
   double knee_deg_per_s = 0.0;
@@ -71,7 +72,7 @@ struct Looks {
 };
 
 // Measures the vertical acceleration of the pelvis, averaged over kAveragedFrames.
-void MeasurePelvis(const Clip& clip, Looks& looks) {
+void MeasurePelvis(const Clip& clip, StairsMotion& motion) {
   std::vector<double> heights_m;
   for (std::size_t f = 0; f + kAveragedFrames <= clip.root_positions_m.size(); ++f) {
     double sum_m = 0.0;
@@ -84,11 +85,11 @@ void MeasurePelvis(const Clip& clip, Looks& looks) {
     accelerations.push_back(std::fabs(bend_m) * kFps * kFps);
   }
   std::ranges::sort(accelerations);
-  looks.acceleration = accelerations.back();
-  looks.usual_acceleration = accelerations[accelerations.size() * 99 / 100];
+  motion.acceleration = accelerations.back();
+  motion.usual_acceleration = accelerations[accelerations.size() * 99 / 100];
 }
 
-void MeasureLegs(const MotionLibrary& library, const Synthesis& synthesis, Looks& looks) {
+void MeasureLegs(const MotionLibrary& library, const Synthesis& synthesis, StairsMotion& motion) {
   LegGeometry legs(library.skeleton(), library.stand_pose());
   const Clip& clip = synthesis.clip;
   const auto frames = static_cast<std::size_t>(clip.frame_count());
@@ -101,10 +102,10 @@ void MeasureLegs(const MotionLibrary& library, const Synthesis& synthesis, Looks
       balls_m.push_back(legs.Sole(foot)[1].y - rest_m);
       knees_deg.push_back(legs.KneeDegrees(foot));
     }
-    looks.knee_deg = std::max(looks.knee_deg, std::ranges::max(knees_deg));
+    motion.knee_deg = std::max(motion.knee_deg, std::ranges::max(knees_deg));
     for (std::size_t f = 1; f + 1 < frames; ++f) {
       const double speed = std::fabs(knees_deg[f + 1] - knees_deg[f - 1]) * 0.5 * kFps;
-      looks.knee_deg_per_s = std::max(looks.knee_deg_per_s, speed);
+      motion.knee_deg_per_s = std::max(motion.knee_deg_per_s, speed);
     }
     // The swings of a foot are between its plants.
     std::map<double, PlantRecord> plants;
@@ -119,7 +120,7 @@ void MeasureLegs(const MotionLibrary& library, const Synthesis& synthesis, Looks
       const double ends_m = std::max(from.anchor_m.y, next->second.anchor_m.y);
       const auto last = std::min(static_cast<std::size_t>(next->second.from_s * kFps), frames - 1);
       for (auto f = static_cast<std::size_t>(from.to_s * kFps); f <= last; ++f) {
-        looks.swing_m = std::max(looks.swing_m, balls_m[f] - ends_m);
+        motion.swing_m = std::max(motion.swing_m, balls_m[f] - ends_m);
       }
     }
   }
@@ -146,7 +147,7 @@ INSTANTIATE_TEST_SUITE_P(Libraries, StairsWalk, testing::Values("", "16", "29"),
                            return name.empty() ? "Builtin" : "Subject" + name;
                          });
 
-TEST_P(StairsWalk, KeepsWithinWhatPeopleDo) {
+TEST_P(StairsWalk, StaysWithinHumanLimits) {
   std::vector<std::string> subjects;
   if (*GetParam() != '\0') subjects.emplace_back(GetParam());
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
@@ -161,21 +162,22 @@ TEST_P(StairsWalk, KeepsWithinWhatPeopleDo) {
   for (const Flight& flight : flights) {
     const Synthesis synthesis = WalkUpAndDown(library, flight);
     for (const WalkRecord& walk : synthesis.walks) EXPECT_TRUE(walk.arrived) << walk.reason;
-    Looks looks;
-    MeasurePelvis(synthesis.clip, looks);
-    MeasureLegs(*library, synthesis, looks);
-    looks.climb_m = LargestClimb(synthesis);
+    StairsMotion motion;
+    MeasurePelvis(synthesis.clip, motion);
+    MeasureLegs(*library, synthesis, motion);
+    motion.climb_m = LargestClimb(synthesis);
     std::printf(
         "%4.1f x %4.1f cm: feet swing up to %4.1f cm above footprints, knees %5.1f deg, %4.0f "
         "deg/s, pelvis %4.1f m/s2, usually below %4.1f, steps climb up to %4.1f cm\n",
-        1e2 * flight.rise_m, 1e2 * flight.tread_m, 1e2 * looks.swing_m, looks.knee_deg,
-        looks.knee_deg_per_s, looks.acceleration, looks.usual_acceleration, 1e2 * looks.climb_m);
-    EXPECT_LE(looks.swing_m, kMostSwingM);
-    EXPECT_LE(looks.knee_deg, kMostKneeDeg);
-    EXPECT_LE(looks.knee_deg_per_s, kMostKneeDegPerS);
-    EXPECT_LE(looks.acceleration, kMostAcceleration);
-    EXPECT_LE(looks.usual_acceleration, kMostUsualAcceleration);
-    EXPECT_LE(looks.climb_m, kMostClimbM);
+        1e2 * flight.rise_m, 1e2 * flight.tread_m, 1e2 * motion.swing_m, motion.knee_deg,
+        motion.knee_deg_per_s, motion.acceleration, motion.usual_acceleration,
+        1e2 * motion.climb_m);
+    EXPECT_LE(motion.swing_m, kMaxSwingM);
+    EXPECT_LE(motion.knee_deg, kMaxKneeDeg);
+    EXPECT_LE(motion.knee_deg_per_s, kMaxKneeDegPerS);
+    EXPECT_LE(motion.acceleration, kMaxAcceleration);
+    EXPECT_LE(motion.usual_acceleration, kMaxUsualAcceleration);
+    EXPECT_LE(motion.climb_m, kMaxClimbM);
   }
 }
 
