@@ -66,7 +66,7 @@ constexpr double kMaxLevelM = 0.05;
 constexpr double kLevelClearanceM = 0.012;
 constexpr double kMaxEarlyLiftM = 0.03;
 // A foot that leaves the ground this early in the blend-in of its movement is not corrected fully.
-constexpr double kLeastSettled = 0.3;
+constexpr double kLeastSettled = 0.2;
 constexpr double kMostlySettled = 0.7;
 
 // Sideways distances between the balls of the feet. A swinging foot that would pass the standing
