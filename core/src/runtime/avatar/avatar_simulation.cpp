@@ -489,7 +489,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
     foot = side_m >= 0.0 ? Foot::kLeft : Foot::kRight;
   }
   auto plan = PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
-                            base_.heading_rad, feet_);
+                            base_.heading_rad, feet_, FootprintUse::kRequested);
   // Whether a leg reaches a footprint depends on the whole pose, so such a step must not vary.
   if (plan) plan->is_varied = !step.exact_only;
   return plan;

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
 
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/runtime/motion_library.h"
@@ -9,8 +12,11 @@
 namespace stridewire {
 namespace {
 
-// The comfortable step length is this fraction of the longest step, but at most kMaxComfortableM.
-constexpr double kComfortablePart = 0.8;
+// The comfortable step length is the median of the captured strides, but at least
+// kLeastComfortablePart and at most kMostComfortablePart of the longest step, and at most
+// kMaxComfortableM.
+constexpr double kLeastComfortablePart = 0.8;
+constexpr double kMostComfortablePart = 0.9;
 constexpr double kMaxComfortableM = 0.62;
 // The width of a walk is taken from examples that step at least kStrideM forward and turn by at
 // most kStraightRad. Examples with the feet closer than kLeastWidthM sideways are ignored.
@@ -29,12 +35,22 @@ struct StepRanges {
   double narrowest_m = HUGE_VAL;
   double width_sum_m = 0.0;
   int widths = 0;
+  // Lengths of captured steps that begin and end in a stride.
+  std::vector<double> strides_m;
 };
+
+double MedianOr(std::vector<double> values, double otherwise) {
+  if (values.empty()) return otherwise;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
 
 void AddGroup(const MotionGroup& group, StepRanges& ranges) {
   const int end_z = group.FindParameter(ParameterName::kEndZ);
   const int turn = group.FindParameter(ParameterName::kTurn);
   const int end_x = group.FindParameter(ParameterName::kEndX);
+  const int start_z = group.FindParameter(ParameterName::kStartZ);
   const int start_x = group.FindParameter(ParameterName::kStartX);
   const int heights[] = {group.FindParameter(ParameterName::kStartY),
                          group.FindParameter(ParameterName::kEndY)};
@@ -52,6 +68,10 @@ void AddGroup(const MotionGroup& group, StepRanges& ranges) {
     ranges.longest_m = std::max(ranges.longest_m, length_m);
     ranges.back_m = std::max(ranges.back_m, -length_m);
     shortest_m = std::min(shortest_m, std::max(length_m, 0.0));
+    const double start_m = start_z < 0 ? 0.0 : -site[static_cast<std::size_t>(start_z)];
+    if (!group.is_completed && std::min(start_m, length_m) >= kStrideM) {
+      ranges.strides_m.push_back(length_m);
+    }
     if (x < 0) continue;
     const double side_m = outward * site[static_cast<std::size_t>(x)];
     if (length_m < kStrideM || side_m < kLeastWidthM) continue;
@@ -96,13 +116,15 @@ LocomotionProfile MakeLocomotionProfile(const MotionLibrary& library) {
     return IsStep(group.kind) && group.FindParameter(ParameterName::kEndY) >= 0;
   });
 
-  const StepRanges ranges = RangesOf(library);
+  StepRanges ranges = RangesOf(library);
   if (ranges.longest_m > 0.0) {
     profile.longest_m = ranges.longest_m;
     profile.shortest_m =
         std::min(std::max(ranges.shortest_m[0], ranges.shortest_m[1]), ranges.longest_m);
-    profile.step_m = std::max(std::min(kComfortablePart * ranges.longest_m, kMaxComfortableM),
-                              profile.shortest_m);
+    const double comfortable_m = std::clamp(MedianOr(std::move(ranges.strides_m), 0.0),
+                                            kLeastComfortablePart * ranges.longest_m,
+                                            kMostComfortablePart * ranges.longest_m);
+    profile.step_m = std::max(std::min(comfortable_m, kMaxComfortableM), profile.shortest_m);
   }
   profile.back_m = 0.75 * ranges.back_m;
   profile.width_m = 0.7 * profile.stand_m;

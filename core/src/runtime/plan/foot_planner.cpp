@@ -42,10 +42,13 @@ constexpr std::array<double, 20> kClearanceSamples{0.09, 0.13, 0.16, 0.19, 0.22,
 // kSteepnessWeight, and by the advance times kAdvanceCost.
 constexpr double kNoticeableLiftM = 0.01;
 constexpr double kMaxAdvanceM = 0.12;
-constexpr double kSteepnessWeight = 0.1;
+constexpr double kSteepnessWeight = 0.2;
 constexpr double kAdvanceCost = 0.2;
 constexpr std::array<double, 12> kAdvances{-1.0 / 6, 1.0 / 6, -1.0 / 3, 1.0 / 3, -0.5, 0.5,
                                            -2.0 / 3, 2.0 / 3, -5.0 / 6, 5.0 / 6, -1.0, 1.0};
+
+// On ground that rises ahead by more than this per metre, a foot does not tilt further.
+constexpr double kSteepRise = 0.27;
 
 // Fractions of the swing at which the reach of the legs is checked.
 constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
@@ -659,6 +662,20 @@ class Planner {
     const FootSupport support = SupportOf(terrain, rig_.side(foot), trajectory.to);
     trajectory.to.position_m.y = StandingHeight(support);
     trajectory.normals[1] = support.normal;
+    StandOnToes(rig_.side(foot), trajectory);
+  }
+
+  // On ground that rises steeply ahead, a foot stands on its toes with the heel off the ground.
+  // Otherwise, its ankle would bend too far.
+  static void StandOnToes(const LegRig::Side& side, FootTrajectory& trajectory) {
+    Vec3& normal = trajectory.normals[1];
+    const DVec3 forward = RotateYaw(trajectory.to.heading_rad, DVec3(0.0, 0.0, 1.0));
+    const double rise = -(normal.x * forward.x + normal.z * forward.z) / normal.y;
+    const double excess = rise - kSteepRise;
+    if (excess <= 0.0) return;
+    const DVec3 flatter = DVec3(normal / normal.y) + excess * forward;
+    normal = Vec3(flatter / std::sqrt(glm::dot(flatter, flatter)));
+    trajectory.to.position_m.y += excess * side.toe_m;
   }
 
   // Raises the swinging foot so that its sole clears the ground. If it has to rise, it also moves

@@ -52,6 +52,10 @@ constexpr double kExactMetresPerRadian = 1.0;
 // A wrong landing height leaves the foot in the air or in the ground, which is worse than landing
 // at the wrong distance.
 constexpr double kHeightWeight = 4.0;
+// Weight of heights at the start and end of a climbing step to a footprint that a caller requests.
+// Planting brings the foot to its height. A level step that is lifted looks better than a climbing
+// step whose length does not fit.
+constexpr double kClimbWeight = 0.5;
 constexpr double kChangeM = 1e-6;
 
 // Requested value of one parameter. If `given` is false, any value within the range of the examples
@@ -218,23 +222,26 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
   return best;
 }
 
-}  // namespace
-
-std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequest& request,
-                                    const FootState& feet, Foot last_moved, bool standing) {
+// See PlanStep. `climb_weight` is the weight of heights at the start and end of climbing steps.
+std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary& library,
+                                        const StepRequest& request, const FootState& feet,
+                                        Foot last_moved, bool standing) {
   const FootState stand{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)};
   const auto plan_foot = [&](Foot foot) {
     const DVec3 start = feet.Vector(foot);
     const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
     const bool is_wide = std::fabs(start.x - stand.Vector(foot).x) > kStartSlackM;
+    const bool climbs =
+        request.at && (request.height_m != 0.0 || std::fabs(start.y) > kLevelSlackM);
     ParameterGoals goals;
     At(goals, ParameterName::kStartX) = {start.x, true, kStartWeight};
-    At(goals, ParameterName::kStartY) = {start.y, true, kStartWeight};
+    At(goals, ParameterName::kStartY) = {start.y, true, climbs ? climb_weight : kStartWeight};
     At(goals, ParameterName::kStartZ) = {start.z, true, kStartWeight};
     At(goals, ParameterName::kEndX) = {
         outward * request.side_m.value_or(0.0), request.side_m.has_value(),
         request.at ? kExactSideWeight : 1.0, !request.side_m && is_wide};
-    At(goals, ParameterName::kEndY) = {request.height_m, true, kHeightWeight};
+    At(goals, ParameterName::kEndY) = {request.height_m, true,
+                                       climbs ? climb_weight : kHeightWeight};
     At(goals, ParameterName::kEndZ) = {request.length_m, true, 1.0};
     At(goals, ParameterName::kTurn) = {request.turn_rad, true,
                                        request.at                ? kExactMetresPerRadian
@@ -261,9 +268,17 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
   return other;
 }
 
+}  // namespace
+
+std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequest& request,
+                                    const FootState& feet, Foot last_moved, bool standing) {
+  return PlanStepWith(kHeightWeight, library, request, feet, last_moved, standing);
+}
+
 std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
                                          const Footprint& print, const DVec3& fixed_m,
-                                         double heading_rad, const FootState& feet) {
+                                         double heading_rad, const FootState& feet,
+                                         FootprintUse use) {
   const DVec3 vector = RotateYaw(-print.heading_rad, print.position_m - fixed_m);
   StepRequest step;
   step.foot = foot;
@@ -272,7 +287,9 @@ std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot
   step.side_m = foot == Foot::kLeft ? vector.x : -vector.x;
   step.height_m = GroundRise(vector.y);
   step.turn_rad = print.heading_rad - heading_rad;
-  std::optional<RequestPlan> plan = PlanStep(library, step, feet, OtherFoot(foot), false);
+  const double climb_weight = use == FootprintUse::kRequested ? kClimbWeight : kHeightWeight;
+  std::optional<RequestPlan> plan =
+      PlanStepWith(climb_weight, library, step, feet, OtherFoot(foot), false);
   if (plan) plan->exact = print;
   return plan;
 }

@@ -78,12 +78,16 @@ inline constexpr double kHurriedRate = 1.6;
                                                   const StepRequest& request, const FootState& feet,
                                                   Foot last_moved, bool standing);
 
+/// The origin of a footprint. A walk can choose another one if the library has no step that fits.
+enum class FootprintUse { kRequested, kWalk };
+
 /// Plans a step to a footprint in world space, by translating it to a request relative to the foot
 /// that stays, which is at `fixed_m`. `print.heading_rad` must be unwrapped to be close to
 /// `heading_rad`, the heading of the body.
 [[nodiscard]] std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
                                                        const Footprint& print, const DVec3& fixed_m,
-                                                       double heading_rad, const FootState& feet);
+                                                       double heading_rad, const FootState& feet,
+                                                       FootprintUse use);
 
 /// Plans a jump.
 [[nodiscard]] std::optional<RequestPlan> PlanJump(const MotionLibrary& library,

@@ -80,6 +80,9 @@ constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
 // length, if that leads onto ground that is at least kLeastClimbM higher or lower than the standing
 // foot. People do not skip treads of stairs either.
 constexpr double kEasyClimbM = 0.18;
+// The same on slopes, where the normal of the ground has at most this y.
+constexpr double kEasySlopeClimbM = 0.15;
+constexpr float kSlopeNormalY = 0.985f;
 constexpr double kLeastClimbM = 0.05;
 constexpr std::array<double, 6> kShorterSteps{0.9, 0.8, 0.7, 0.6, 0.5, 0.4};
 
@@ -256,6 +259,11 @@ class StepPlanner {
     return print;
   }
 
+  [[nodiscard]] bool IsSloped(const Footprint& print) const {
+    const FootSupport support = SupportOf(*terrain_, library_.leg_rig().side(moving_), print);
+    return support.normal.y < kSlopeNormalY;
+  }
+
   // Returns the footprint, moved back toward the standing foot if the step would climb or descend
   // too much.
   Footprint WithEasyClimb(const Footprint& print) const {
@@ -263,14 +271,15 @@ class StepPlanner {
       return terrain_->HeightAt(at.position_m.x, at.position_m.z) - fixed_m_.y;
     };
     const double full_m = climb_m(print);
-    if (std::fabs(full_m) <= kEasyClimbM) return print;
+    const double easy_m = IsSloped(print) ? kEasySlopeClimbM : kEasyClimbM;
+    if (std::fabs(full_m) <= easy_m) return print;
     const double ahead_m = RotateYaw(-print.heading_rad, print.position_m - fixed_m_).z;
     for (const double part : kShorterSteps) {
       Footprint shorter = print;
       shorter.position_m -= RotateYaw(print.heading_rad, DVec3(0.0, 0.0, (1.0 - part) * ahead_m));
       shorter = WithRoom(shorter);
       const double part_m = climb_m(shorter) * (full_m > 0.0 ? 1.0 : -1.0);
-      if (part_m >= kLeastClimbM && part_m <= kEasyClimbM && Carries(moving_, shorter)) {
+      if (part_m >= kLeastClimbM && part_m <= easy_m && Carries(moving_, shorter)) {
         return shorter;
       }
     }
@@ -304,8 +313,8 @@ class StepPlanner {
   // Plans the library's step to a footprint. Returns nullopt if the step misses the footprint by
   // more than planting can distribute over the swing.
   std::optional<PlannedStep> PlanExactStep(const Footprint& print, const WalkStep& step) const {
-    auto plan =
-        PlanFootprint(library_, moving_, print, fixed_m_, stance_.heading_rad, stance_.vector);
+    auto plan = PlanFootprint(library_, moving_, print, fixed_m_, stance_.heading_rad,
+                              stance_.vector, FootprintUse::kWalk);
     if (!plan) return std::nullopt;
     const MotionGroup& group = library_.group(plan->group);
     const DVec3 wanted = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);

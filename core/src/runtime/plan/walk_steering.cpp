@@ -46,6 +46,8 @@ constexpr double kBackM = 0.2;
 // Goals closer than this are reached without turning towards them first.
 constexpr double kShuffleM = 0.15;
 constexpr double kSideStepM = 0.32;
+// A distance sideways is divided into steps of about this length.
+constexpr double kLongSideStepM = 0.345;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
 // Expected duration of a stride, to compare ways of reaching a goal. Steps that turn on the spot or
@@ -254,16 +256,20 @@ bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   };
   const double way_rad = HeadingTo(way);
   const double walking_s = turning_s(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
-                           kStrideS * remaining_m / StepM() + kQuickStepS +
+                           kStrideS * PartCount(remaining_m, StepM()) + kQuickStepS +
                            turning_s(WrapAngle(approach_.heading_rad - way_rad), kSpotTurn.out_rad);
-  const DVec3 local = RotateYaw(-body.heading_rad, way);
+  // While it steps, the body turns to its final heading, so the way leads in a direction between
+  // those of both headings. With the present heading, walks would prefer the one at one step and
+  // the other at the next, and zigzag.
+  const double turn_rad = WrapAngle(approach_.heading_rad - body.heading_rad);
+  const DVec3 local = RotateYaw(-body.heading_rad - 0.5 * turn_rad, way);
   const double ahead_m = local.z >= 0.0 ? StepM() : std::max(profile_.back_m, kLeastBackM);
   const double shifting_s =
-      kQuickStepS + std::max({kQuickStepS * std::fabs(local.z) / ahead_m,
-                              kQuickStepS * 2.0 * std::fabs(local.x) / kSideStepM,
-                              turning_s(WrapAngle(approach_.heading_rad - body.heading_rad), 0.0)});
-  // Such libraries often do not have the side steps, which are short, either.
-  const bool may_lack_steps = profile_.shortest_m > kShortestStepM || profile_.back_m < kBackM;
+      std::max({kQuickStepS * (1.0 + std::fabs(local.z) / ahead_m),
+                kQuickStepS * 2.0 * PartCount(std::fabs(local.x), kLongSideStepM),
+                kQuickStepS + turning_s(turn_rad, 0.0)});
+  // Such libraries often do not have side steps, either.
+  const bool may_lack_steps = profile_.back_m < kBackM;
   return shifting_s <= walking_s - (may_lack_steps ? kStrideMarginS : 0.0);
 }
 
@@ -430,7 +436,7 @@ WalkStep WalkSteering::SideStep(const Body& body, Foot moving, double part, doub
   // Sideways movement and turning take pairs of steps: the outer foot moves, the other follows.
   const double side_pairs = std::fabs(local.x) <= inner_m && aside_m < 0.0
                                 ? 0.0
-                                : PartCount(std::fabs(local.x), kSideStepM);
+                                : PartCount(std::fabs(local.x), kLongSideStepM);
   const double turn_pairs =
       std::fabs(turn_rad) <= kSpotTurn.in_rad && turn_out_rad < 0.0
           ? 0.0

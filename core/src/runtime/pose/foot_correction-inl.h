@@ -101,7 +101,10 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   // The extra turn of the body does not rotate a standing foot. During its swing, the foot catches
   // up with the turn that the body will have made by the time it lands.
   c.turned = one - EaseOut(s);
-  c.tilted = one - Constant<Number>(1.0 - kSwingTilt) * (across * across);
+  const Number late =
+      EaseOut(DivideBy(s - Constant<Number>(kLandingTiltStart), 1.0 - kLandingTiltStart));
+  const Number swung = Select(s > Constant<Number>(0.5), late, across * across);
+  c.tilted = one - Constant<Number>(1.0 - kSwingTilt) * swung;
   const auto& turn = trajectory.turn;
   Number free = turn[0] + settled * (turn[1] - turn[0]) + c.turned * (turn[2] - turn[1]);
   free = free + (ExtraTurnAt(timing, Min(trajectory.land_s, timing.duration_s)) * c.turned -

@@ -36,6 +36,9 @@ inline constexpr double kSinkStart = 0.35;
 // A foot tilts with the slope of the ground that it stands on, but in the middle of a swing only by
 // this share of the slope. Otherwise, the ankle of a bent leg would bend too far on ramps.
 inline constexpr double kSwingTilt = 0.4;
+// Fraction of the swing at which its tilt begins to grow to that of the footprint. A foot that
+// lands has its toes up already, so the slope of a ramp is added late.
+inline constexpr double kLandingTiltStart = 0.75;
 // A curve that rises from 0 to 1, stays there and falls back to 0, at fractions of the swing.
 struct LiftCurve {
   double begin, top, falls, end;
