@@ -52,10 +52,11 @@ constexpr double kExactMetresPerRadian = 1.0;
 // A wrong landing height leaves the foot in the air or in the ground, which is worse than landing
 // at the wrong distance.
 constexpr double kHeightWeight = 4.0;
-// Weight of heights at the start and end of a climbing step to a footprint that a caller requests.
-// Planting brings the foot to its height. A level step that is lifted looks better than a climbing
-// step whose length does not fit.
+// Weight of heights at the start and end of a climbing step to a requested footprint that the best
+// step misses by more than kMaxClimbMissM, seen from above. Planting brings the foot to its height.
+// A level step that is lifted looks better than a climbing step whose length does not fit.
 constexpr double kClimbWeight = 0.5;
+constexpr double kMaxClimbMissM = 0.16;
 constexpr double kChangeM = 1e-6;
 
 // Requested value of one parameter. If `given` is false, any value within the range of the examples
@@ -222,6 +223,19 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
   return best;
 }
 
+// Returns the distance between the requested and the applied end of a step, seen from above.
+double HorizontalMissM(const MotionGroup& group, const RequestPlan& plan) {
+  double squared = 0.0;
+  for (const ParameterName name : {ParameterName::kEndX, ParameterName::kEndZ}) {
+    const int l = group.FindParameter(name);
+    if (l < 0) continue;
+    const auto i = static_cast<std::size_t>(l);
+    const double miss_m = plan.requested.values[i] - plan.applied.values[i];
+    squared += miss_m * miss_m;
+  }
+  return std::sqrt(squared);
+}
+
 // See PlanStep. `climb_weight` is the weight of heights at the start and end of climbing steps.
 std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary& library,
                                         const StepRequest& request, const FootState& feet,
@@ -287,9 +301,11 @@ std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot
   step.side_m = foot == Foot::kLeft ? vector.x : -vector.x;
   step.height_m = GroundRise(vector.y);
   step.turn_rad = print.heading_rad - heading_rad;
-  const double climb_weight = use == FootprintUse::kRequested ? kClimbWeight : kHeightWeight;
-  std::optional<RequestPlan> plan =
-      PlanStepWith(climb_weight, library, step, feet, OtherFoot(foot), false);
+  std::optional<RequestPlan> plan = PlanStep(library, step, feet, OtherFoot(foot), false);
+  if (plan && use == FootprintUse::kRequested &&
+      HorizontalMissM(library.group(plan->group), *plan) > kMaxClimbMissM) {
+    plan = PlanStepWith(kClimbWeight, library, step, feet, OtherFoot(foot), false);
+  }
   if (plan) plan->exact = print;
   return plan;
 }
