@@ -16,7 +16,7 @@ namespace {
 // kLeastComfortablePart and at most kMostComfortablePart of the longest step, and at most
 // kMaxComfortableM.
 constexpr double kLeastComfortablePart = 0.8;
-constexpr double kMostComfortablePart = 0.9;
+constexpr double kMostComfortablePart = 0.83;
 constexpr double kMaxComfortableM = 0.62;
 // The width of a walk is taken from examples that step at least kStrideM forward and turn by at
 // most kStraightRad. Examples with the feet closer than kLeastWidthM sideways are ignored.

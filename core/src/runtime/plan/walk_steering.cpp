@@ -263,13 +263,14 @@ bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   // the other at the next, and zigzag.
   const double turn_rad = WrapAngle(approach_.heading_rad - body.heading_rad);
   const DVec3 local = RotateYaw(-body.heading_rad - 0.5 * turn_rad, way);
-  const double ahead_m = local.z >= 0.0 ? StepM() : std::max(profile_.back_m, kLeastBackM);
-  const double shifting_s =
-      std::max({kQuickStepS * (1.0 + std::fabs(local.z) / ahead_m),
-                kQuickStepS * 2.0 * PartCount(std::fabs(local.x), kLongSideStepM),
-                kQuickStepS + turning_s(turn_rad, 0.0)});
-  // Such libraries often do not have side steps, either.
-  const bool may_lack_steps = profile_.back_m < kBackM;
+  const double along_s =
+      local.z >= 0.0 ? kStrideS * PartCount(local.z, StepM())
+                     : kQuickStepS * PartCount(-local.z, std::max(profile_.back_m, kLeastBackM));
+  const double shifting_s = std::max(
+      {kQuickStepS + along_s, kQuickStepS * 2.0 * PartCount(std::fabs(local.x), kLongSideStepM),
+       kQuickStepS + turning_s(turn_rad, 0.0)});
+  // Such libraries often do not have side steps, which are short, either.
+  const bool may_lack_steps = profile_.shortest_m > kShortestStepM || profile_.back_m < kBackM;
   return shifting_s <= walking_s - (may_lack_steps ? kStrideMarginS : 0.0);
 }
 
