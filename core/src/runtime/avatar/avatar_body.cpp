@@ -90,9 +90,14 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScr
   GridCache& cache = scratch.cache();
   cache.Clear();
   if (plants_feet) {
-    ContinueFeet(keeps_speed, PlanFeet(*library, locks, landing, {blended_pose, earlier}, scratch,
-                                       pose, movement));
-    LiftWhileSettling(*library, scratch, pose, movement);
+    const FootPlanJob job{.library = *library,
+                          .locks = locks,
+                          .source = {blended_pose, earlier},
+                          .scratch = scratch,
+                          .pose = pose,
+                          .movement = movement};
+    ContinueFeet(keeps_speed, PlanFeet(job, landing));
+    LiftWhileSettling(job);
     if (begins_planting) BeginPlantFade(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
     return;

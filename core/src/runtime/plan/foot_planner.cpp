@@ -5,8 +5,9 @@
 
 #include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
-#include "runtime/library/keytimes.h"
 #include "runtime/plan/foot_sampler.h"
+#include "runtime/plan/sole_levels.h"
+#include "runtime/plan/swing_path.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/foot_plant_constants.h"
@@ -15,40 +16,8 @@
 namespace stridewire {
 namespace {
 
-// In captures, the ball of a foot leaves the ground kBallLeavesS before toe-off and comes to rest
-// kBallRestsS after heel-strike, both at the playback speed of the captures.
-constexpr double kBallLeavesS = 0.06;
-constexpr double kBallRestsS = 0.08;
-constexpr double kShortestSwingS = 0.05;
 // Velocities are measured as differences over twice this time.
 constexpr double kVelocityStepS = 0.004;
-
-constexpr double kHalfFootWidthM = 0.04;
-// A sole rests on ground that rises up to kBumpM above its plane. Anything higher is a wall.
-constexpr double kBumpM = 0.05;
-// A swinging foot clears the ground within kPassingRadiusM by up to kClearanceM, but is lifted by
-// at most kMaxLiftM.
-constexpr double kClearanceM = 0.037;
-constexpr double kMaxLiftM = 0.4;
-constexpr double kPassingRadiusM = 0.02;
-// Fractions of the swing at which clearance is checked, closest together where the foot passes the
-// edges of treads. Closer to its footprints, LiftOutOfGround keeps the foot above their ground.
-constexpr std::array<double, 20> kClearanceSamples{0.09, 0.13, 0.16, 0.19, 0.22, 0.25, 0.28,
-                                                   0.32, 0.37, 0.43, 0.49, 0.55, 0.61, 0.66,
-                                                   0.71, 0.76, 0.8,  0.84, 0.88, 0.91};
-
-// A foot that is lifted by more than kNoticeableLiftM may be ahead of its path or behind it by up
-// to kMaxAdvanceM. Swings are compared by their peaks, by their steepness in metres per swing times
-// kSteepnessWeight, and by the advance times kAdvanceCost.
-constexpr double kNoticeableLiftM = 0.01;
-constexpr double kMaxAdvanceM = 0.12;
-constexpr double kSteepnessWeight = 0.2;
-constexpr double kAdvanceCost = 0.2;
-constexpr std::array<double, 12> kAdvances{-1.0 / 6, 1.0 / 6, -1.0 / 3, 1.0 / 3, -0.5, 0.5,
-                                           -2.0 / 3, 2.0 / 3, -5.0 / 6, 5.0 / 6, -1.0, 1.0};
-
-// On ground that rises ahead by more than this per metre, a foot does not tilt further.
-constexpr double kSteepRise = 0.27;
 
 // Fractions of the swing at which the reach of the legs is checked.
 constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
@@ -57,12 +26,6 @@ constexpr double kMaxRootSinkM = 0.3;
 // Largest sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
 
-// Standing soles may be this far above and below the ground, because the height of the sole is not
-// known exactly from a capture. If the distance is larger, the height of the foot is corrected by
-// up to kMaxLevelM. Larger differences are not errors of the blend.
-constexpr double kMaxHoverM = 0.006;
-constexpr double kMaxSinkM = 0.003;
-constexpr double kMaxLevelM = 0.05;
 // On level ground, a swinging foot stays at least this far above it. A foot that has just left the
 // ground may be kMaxSinkM below it, because its toes leave last. It is lifted by at most
 // kMaxEarlyLiftM.
@@ -93,28 +56,10 @@ constexpr std::array<double, 3> kLandingSamples{0.9, 0.94, 0.97};
 // A landing foot may briefly be this far in the ground.
 constexpr double kMaxLandingSinkM = 0.008;
 
-// Fractions of the stance at which the standing foot is sampled, and the indices of those at which
-// it is levelled. At the others it may be kStanceSlackM beyond the limits.
-constexpr std::array<double, 16> kStanceSamples{0.0,  0.04, 0.1,  0.17, 0.25, 0.33, 0.42, 0.5,
-                                                0.58, 0.67, 0.75, 0.83, 0.9,  0.95, 0.98, 1.0};
-constexpr std::array<std::size_t, 5> kLevelSamples{0, 4, 7, 10, 15};
-constexpr double kStanceSlackM = 0.002;
 // Fractions of the blend-in at which standing feet are sampled.
 constexpr std::array<double, 7> kSettleSamples{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
 // Standing feet are lifted by at most this while the difference pose fades out.
 constexpr double kMaxSettleLiftM = 0.05;
-
-// Returns the additional height of the ball's centre above the ground on a slope. The centre is at
-// a fixed distance from the ground plane, so the vertical distance grows with the slope.
-double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
-  return side.ball_height_m * (1.0 / normal.y - 1.0);
-}
-
-// Returns the height of the ground under a sole. The sole rests on the highest bump below it. Walls
-// are ignored, because a step should not be placed on a wall in the first place.
-double StandingHeight(const FootSupport& support) {
-  return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
-}
 
 double ValueOr(const MotionGroup& group, const ParameterValues& values, ParameterName name,
                double otherwise) {
@@ -122,165 +67,18 @@ double ValueOr(const MotionGroup& group, const ParameterValues& values, Paramete
   return l < 0 ? otherwise : values.values[static_cast<std::size_t>(l)];
 }
 
-// A polynomial of degree 4 in the fraction of a movement.
-struct Quartic {
-  double constant;
-  std::array<double, 4> coefficients;  // Of u, u^2, u^3 and u^4.
-
-  [[nodiscard]] double At(double u) const {
-    const auto& c = coefficients;
-    return constant + u * (c[0] + u * (c[1] + u * (c[2] + u * c[3])));
-  }
-};
-
-// Range of heights to add to a sole.
-struct HeightRange {
-  double min_m = 0.0;
-  double max_m = 0.0;
-};
-
-// Returns by how much a sole may be raised that is `above_m` above the ground. Afterwards it may be
-// `slack_m` beyond the usual limits.
-HeightRange LevellingRange(double above_m, double slack_m = 0.0) {
-  return {std::clamp(-kMaxSinkM - slack_m - above_m, -kMaxLevelM, kMaxLevelM),
-          std::clamp(kMaxHoverM + slack_m - above_m, -kMaxLevelM, kMaxLevelM)};
-}
-
-// Returns by how much a sole has to be raised that is `above_m` above the ground.
-double Levelling(double above_m) {
-  const HeightRange range = LevellingRange(above_m);
-  return std::clamp(0.0, range.min_m, range.max_m);
-}
-
-// Returns the quartic that has these values at kLevelSamples, by Newton's forward differences.
-Quartic QuarticThrough(std::array<double, kLevelSamples.size()> values) {
-  const double constant = values[0];
-  std::array<double, 4> d{};
-  for (std::size_t order = 0; order < d.size(); ++order) {
-    for (std::size_t i = 0; i + order < d.size(); ++i) values[i] = values[i + 1] - values[i];
-    d[order] = values[0];
-  }
-  return {constant,
-          {4.0 * (d[0] - d[1] / 2.0 + d[2] / 3.0 - d[3] / 4.0),
-           16.0 * (d[1] / 2.0 - d[2] / 2.0 + 11.0 * d[3] / 24.0), 64.0 * (d[2] / 6.0 - d[3] / 4.0),
-           256.0 * d[3] / 24.0}};
-}
-
-// Returns heights that keep a sole on the ground during a stance. `above_m` are its heights above
-// the ground at kStanceSamples, and `ranges` the heights that may be added there. The quartic
-// levels the sole at five samples. If it is out of range at others, it is projected onto one range
-// after the other (Kaczmarz).
-Quartic LevellingQuartic(const std::array<double, kStanceSamples.size()>& above_m,
-                         const std::array<HeightRange, kStanceSamples.size()>& ranges) {
-  constexpr int kSweeps = 20;
-  std::array<double, kLevelSamples.size()> values;
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = Levelling(above_m[kLevelSamples[i]]);
-  Quartic level = QuarticThrough(values);
-  // What is added is a sum of the Legendre polynomials on [0, 1].
-  using Values = std::array<double, 5>;
-  Values added{};
-  const auto basis = [](double u) -> Values {
-    const double x = 2.0 * u - 1.0;
-    const double x2 = x * x;
-    return {1.0, x, 1.5 * x2 - 0.5, (2.5 * x2 - 1.5) * x, (4.375 * x2 - 3.75) * x2 + 0.375};
-  };
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
-      const Values at = basis(kStanceSamples[i]);
-      double height_m = level.At(kStanceSamples[i]);
-      double scale = 0.0;
-      for (std::size_t k = 0; k < at.size(); ++k) {
-        height_m += added[k] * at[k];
-        scale += at[k] * at[k];
-      }
-      const double lacking_m = std::clamp(height_m, ranges[i].min_m, ranges[i].max_m) - height_m;
-      for (std::size_t k = 0; k < at.size(); ++k) added[k] += lacking_m / scale * at[k];
-    }
-  }
-  level.constant += added[0] - added[1] + added[2] - added[3] + added[4];
-  auto& c = level.coefficients;
-  c[0] += 2.0 * added[1] - 6.0 * added[2] + 12.0 * added[3] - 20.0 * added[4];
-  c[1] += 6.0 * added[2] - 30.0 * added[3] + 90.0 * added[4];
-  c[2] += 20.0 * added[3] - 140.0 * added[4];
-  c[3] += 70.0 * added[4];
-  return level;
-}
-
-constexpr std::size_t kEarlyLift = 0;
-constexpr std::size_t kMiddleLift = 1;
-
-// A value at each of kClearanceSamples.
-using SwingValues = std::array<double, kClearanceSamples.size()>;
-
-struct SwingLifts {
-  std::array<double, 3> lift_m{};  // FootTrajectory::lift_m
-  double cost_m = HUGE_VAL;
-};
-
-// Returns the cost of a swing with these heights: its peak above both footprints and its steepest
-// part, from one footprint to the other.
-double SwingCost(const SwingValues& heights_m, double from_m, double to_m) {
-  double peak_m = std::max(from_m, to_m);
-  double steepest_m = 0.0;
-  double before_m = from_m;
-  double before = 0.0;
-  for (std::size_t s = 0; s <= kClearanceSamples.size(); ++s) {
-    const bool is_last = s == kClearanceSamples.size();
-    const double height_m = is_last ? to_m : heights_m[s];
-    const double part = is_last ? 1.0 : kClearanceSamples[s];
-    peak_m = std::max(peak_m, height_m);
-    steepest_m = std::max(steepest_m, std::fabs(height_m - before_m) / (part - before));
-    before_m = height_m;
-    before = part;
-  }
-  return peak_m - std::max(from_m, to_m) + kSteepnessWeight * steepest_m;
-}
-
-// Returns the lifts with the lowest cost whose sum is at least `lacks_m` at each sample of the
-// swing, as far as kMaxLiftM allows. `heights_m` are the heights of the foot without lifts.
-SwingLifts LowestLifts(const SwingValues& lacks_m, const SwingValues& heights_m, double from_m,
-                       double to_m) {
-  constexpr int kMiddleLifts = 16;
-  std::array<SwingValues, 3> shares;
-  for (std::size_t lift = 0; lift < shares.size(); ++lift) {
-    std::ranges::transform(kClearanceSamples, shares[lift].begin(),
-                           [lift](double part) { return LiftShare(lift, part); });
-  }
-  // For each lift in the middle, the smallest early and late lifts follow from the two halves.
-  const double most_m = std::min(1.5 * std::ranges::max(lacks_m), kMaxLiftM);
-  SwingLifts best;
-  for (int i = 0; i <= kMiddleLifts; ++i) {
-    SwingLifts lifts{.lift_m = {0.0, most_m * i / kMiddleLifts, 0.0}};
-    for (std::size_t s = 0; s < kClearanceSamples.size(); ++s) {
-      const std::size_t half = kClearanceSamples[s] < 0.5 ? 0 : 2;
-      const double lacks = lacks_m[s] - lifts.lift_m[kMiddleLift] * shares[kMiddleLift][s];
-      lifts.lift_m[half] =
-          std::max(lifts.lift_m[half], std::min(lacks / shares[half][s], kMaxLiftM));
-    }
-    SwingValues lifted_m = heights_m;
-    for (std::size_t s = 0; s < kClearanceSamples.size(); ++s) {
-      for (std::size_t lift = 0; lift < shares.size(); ++lift) {
-        lifted_m[s] += lifts.lift_m[lift] * shares[lift][s];
-      }
-    }
-    lifts.cost_m = SwingCost(lifted_m, from_m, to_m);
-    if (lifts.cost_m < best.cost_m) best = lifts;
-  }
-  return best;
-}
-
 class Planner {
  public:
-  Planner(const MotionLibrary& library, FootPlanScratch& scratch, PoseSpan pose, Movement& movement)
-      : library_(library),
-        skeleton_(library.skeleton()),
-        rig_(library.leg_rig()),
-        group_(library.group(movement.group)),
-        cache_(scratch.cache()),
-        pose_(pose),
-        movement_(movement),
-        sampler_(scratch, pose),
-        contact_sampler_(scratch, pose) {}
+  explicit Planner(const FootPlanJob& job)
+      : library_(job.library),
+        skeleton_(job.library.skeleton()),
+        rig_(job.library.leg_rig()),
+        group_(job.library.group(job.movement.group)),
+        cache_(job.scratch.cache()),
+        pose_(job.pose),
+        movement_(job.movement),
+        sampler_(job.scratch, job.pose),
+        contact_sampler_(job.scratch, job.pose) {}
 
   FeetAt FeetOf(ConstPoseSpan pose) const {
     FeetAt feet;
@@ -425,7 +223,7 @@ class Planner {
     }
     trajectory.to.heading_rad = landing_rad + turn_rad;
     trajectory.turn_rad[2] = turn_rad;
-    if (target.terrain != nullptr) StandOnGround(moving, *target.terrain, trajectory);
+    if (target.terrain != nullptr) LandOnGround(*target.terrain, rig_.side(moving), trajectory);
     const double ground_m =
         locks[x].print.position_m.y + SlopeRise(rig_.sides[x], locks[x].normal) + rise_m;
     trajectory.height_m[2] = trajectory.to.position_m.y +
@@ -658,58 +456,14 @@ class Planner {
     return missing_m;
   }
 
-  void StandOnGround(Foot foot, const Terrain& terrain, FootTrajectory& trajectory) const {
-    const FootSupport support = SupportOf(terrain, rig_.side(foot), trajectory.to);
-    trajectory.to.position_m.y = StandingHeight(support);
-    trajectory.normals[1] = support.normal;
-    StandOnToes(rig_.side(foot), trajectory);
-  }
-
-  // On ground that rises steeply ahead, a foot stands on its toes with the heel off the ground.
-  // Otherwise, its ankle would bend too far.
-  static void StandOnToes(const LegRig::Side& side, FootTrajectory& trajectory) {
-    Vec3& normal = trajectory.normals[1];
-    const DVec3 forward = RotateYaw(trajectory.to.heading_rad, DVec3(0.0, 0.0, 1.0));
-    const double rise = -(normal.x * forward.x + normal.z * forward.z) / normal.y;
-    const double excess = rise - kSteepRise;
-    if (excess <= 0.0) return;
-    const DVec3 flatter = DVec3(normal / normal.y) + excess * forward;
-    normal = Vec3(flatter / std::sqrt(glm::dot(flatter, flatter)));
-    trajectory.to.position_m.y += excess * side.toe_m;
-  }
-
-  // Raises the swinging foot so that its sole clears the ground. If it has to rise, it also moves
-  // later or earlier toward its footprint, to pass the edge of a tread at a better moment.
+  // Raises the swinging foot so that its sole clears the ground (ChooseSwing).
   void ClearGround(Foot moving, const Terrain& terrain, FootTrajectory& trajectory) {
-    const SwingSoles soles = SampleSoles(moving);
-    const DVec3 way = trajectory.to.position_m - trajectory.from.position_m;
-    const double length_m = std::sqrt(way.x * way.x + way.z * way.z);
-    const auto lifts_with = [&](const DVec3& advance_m) {
-      return LiftsOver(soles, trajectory, advance_m, terrain);
-    };
-    SwingLifts best = lifts_with(DVec3(0.0));
-    if (std::ranges::max(best.lift_m) > kNoticeableLiftM && length_m > 2.0 * kMaxAdvanceM) {
-      const DVec3 forward(way.x / length_m, 0.0, way.z / length_m);
-      for (const double part : kAdvances) {
-        const DVec3 advance = part * kMaxAdvanceM * forward;
-        SwingLifts lifts = lifts_with(advance);
-        lifts.cost_m += kAdvanceCost * std::fabs(part) * kMaxAdvanceM;
-        if (lifts.cost_m >= best.cost_m) continue;
-        best = lifts;
-        trajectory.aside_m = advance;
-      }
-    }
-    trajectory.lift_m = best.lift_m;
+    const SwingPath path = ChooseSwing(SampleSoles(moving), trajectory, terrain);
+    trajectory.lift_m = path.lift_m;
+    trajectory.aside_m = path.advance_m;
   }
 
  private:
-  // The sole of a swinging foot without lifts, at kClearanceSamples.
-  struct SwingSoles {
-    // Ball, heel and toe tip, minus their heights above the ground at rest.
-    std::array<std::array<DVec3, 3>, kClearanceSamples.size()> points_m;
-    SwingValues balls_m;  // Heights of the ball above its height at rest.
-  };
-
   SwingSoles SampleSoles(Foot moving) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const LegRig::Side& side = rig_.side(moving);
@@ -733,27 +487,6 @@ class Planner {
       soles.balls_m[i] = soles.points_m[i][0].y;
     }
     return soles;
-  }
-
-  // Returns the lifts that a foot needs to clear the ground if `aside_m` is added to its path
-  // (FootTrajectory::aside_m).
-  static SwingLifts LiftsOver(const SwingSoles& soles, const FootTrajectory& trajectory,
-                              const DVec3& aside_m, const Terrain& terrain) {
-    SwingValues lacks_m{};
-    for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
-      const double part = kClearanceSamples[i];
-      const double across = 4.0 * part * (1.0 - part);
-      // Near its footprints, a foot may be close to a riser without touching it.
-      const double away = LiftShare(kMiddleLift, part);
-      const double radius_m = kPassingRadiusM * (0.25 + 0.75 * away);
-      for (const DVec3& point : soles.points_m[i]) {
-        const DVec3 at = point + across * across * aside_m;
-        const double ground_m = terrain.HighestWithin(at.x, at.z, radius_m);
-        lacks_m[i] = std::max(lacks_m[i], ground_m + kClearanceM * away - at.y);
-      }
-    }
-    return LowestLifts(lacks_m, soles.balls_m, trajectory.from.position_m.y,
-                       trajectory.to.position_m.y);
   }
 
   // Returns the lift `lift` (FootTrajectory::lift_m) with which the moving foot is at least
@@ -807,78 +540,17 @@ class Planner {
 
 }  // namespace
 
-SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement) {
-  const double duration_s = movement.duration_s();
-  if (movement.warp.interval_count() < 3) return {0.25 * duration_s, 0.9 * duration_s};
-  const ContactKeytimes contact = ContactKeytimesOf(kind, movement.warp.interval_count());
-  const double off_s = movement.warp.keytime_s(contact.toe_off);
-  SwingTimes times;
-  times.release_s = std::max(off_s - kBallLeavesS / movement.rate, 0.5 * off_s);
-  times.land_s =
-      std::min(movement.warp.keytime_s(contact.landing) + kBallRestsS / movement.rate, duration_s);
-  times.release_s = std::min(times.release_s, times.land_s - kShortestSwingS);
-  return times;
-}
-
-double TimeAtPhase(const SwingTimes& swing, double phase) {
-  return phase <= 1.0 ? phase * swing.release_s
-                      : swing.release_s + (phase - 1.0) * (swing.land_s - swing.release_s);
-}
-
-FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side, const Footprint& print) {
-  return SupportOf(terrain, print.position_m.x, print.position_m.z, print.heading_rad,
-                   {side.foot_m + kSoleBehindAnkleM, side.toe_m, kHalfFootWidthM});
-}
-
-FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
-                      double ground_m, const Terrain* terrain) {
-  FootLocks locks;
-  LegPose leg;
-  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    EvaluateLeg(skeleton, rig, pose, foot, leg);
-    const BlendedFoot blended = FootOf(rig, foot, DVec3(pose.root_position_m), leg);
-    FootLock& lock = locks[static_cast<std::size_t>(foot)];
-    lock.print = {DVec3(blended.ball_m.x, ground_m, blended.ball_m.z), blended.heading_rad};
-    if (terrain == nullptr) continue;
-    const FootSupport support = SupportOf(*terrain, rig.side(foot), lock.print);
-    lock.print.position_m.y = StandingHeight(support);
-    lock.normal = support.normal;
-    lock.height_m = lock.print.position_m.y - ground_m + SlopeRise(rig.side(foot), support.normal);
-  }
-  return locks;
-}
-
-void StandOn(const FootLocks& locks, Movement& movement) {
-  movement.warp = TimeWarp(std::array{0.0, kEaseOutS}, std::array{1});
-  movement.start_offset_s = movement.extra_turn_rad = 0.0;
-  movement.ease_out_s = kEaseOutS;
-  FootPlan& plan = movement.feet;
-  plan = {};
-  plan.is_active = true;
-  for (std::size_t f = 0; f < 2; ++f) {
-    const FootLock& lock = locks[f];
-    FootTrajectory& trajectory = plan.feet[f];
-    trajectory.from = trajectory.to = lock.print;
-    trajectory.normals.fill(lock.normal);
-    trajectory.height_m.fill(lock.height_m);
-    trajectory.turn_rad.fill(lock.turn_rad);
-    trajectory.root_weight = lock.root_weight;
-  }
-}
-
 namespace {
 
 // Plans the feet of a movement: for the target `target` or, if that is null, from the decision
 // `decision` that another program made. Both cases share this code, so a replica that receives the
 // decision computes the same plan.
-std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
-                           const LandingTarget* target, const LandingDecision& decision,
-                           const BlendSource& source, FootPlanScratch& scratch, PoseSpan pose,
-                           Movement& movement) {
+std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
+                           const LandingDecision& decision) {
+  const auto& [library, locks, source, scratch, pose, movement] = job;
   const MotionGroup& group = library.group(movement.group);
   STRIDEWIRE_CHECK(&scratch.library() == &library && library.leg_rig().is_usable);
-  GridCache& cache = scratch.cache();
-  Planner planner(library, scratch, pose, movement);
+  Planner planner(job);
   const bool is_step = IsStep(group.kind);
   const Foot moving = is_step ? MovingFoot(group.kind) : Foot::kLeft;
   const Foot fixed = OtherFoot(moving);
@@ -903,14 +575,14 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   }
 
   // The difference pose is D = P - M, where P is the pose in which the previous movement ended.
-  EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, cache,
+  EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, scratch.cache(),
                 movement.difference);
   const FeetAt start = planner.FeetOf(movement.difference);
   const FeetAt previous = planner.FeetOf(source.before);
   Subtract(source.before, movement.difference, movement.difference);
   if (source.earlier) {
-    SetDifferenceVelocity(group, library.layout(), source.before, *source.earlier, cache, pose,
-                          movement);
+    SetDifferenceVelocity(group, library.layout(), source.before, *source.earlier, scratch.cache(),
+                          pose, movement);
   }
   planner.SampleKeyPoses(times);
 
@@ -1008,58 +680,18 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
 
 }  // namespace
 
-std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingTarget& target, const BlendSource& source,
-                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement) {
-  return Plan(library, locks, &target, {}, source, scratch, pose, movement);
+std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingTarget& target) {
+  return Plan(job, &target, {});
 }
 
-std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingDecision& decision, const BlendSource& source,
-                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement) {
-  return Plan(library, locks, nullptr, decision, source, scratch, pose, movement);
+std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingDecision& decision) {
+  return Plan(job, nullptr, decision);
 }
 
-void LiftWhileSettling(const MotionLibrary& library, FootPlanScratch& scratch, PoseSpan pose,
-                       Movement& movement) {
-  const MotionGroup& group = library.group(movement.group);
-  if (!movement.feet.is_active || movement.feet.keeps_above_ground || !IsStep(group.kind)) return;
-  Planner(library, scratch, pose, movement).LiftWhileSettling();
-}
-
-LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
-  const FootPlan& plan = movement.feet;
-  LandingDecision decision{.extra_turn_rad = movement.extra_turn_rad,
-                           .is_on_terrain = plan.keeps_above_ground,
-                           .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
-  if (!IsStep(kind)) return decision;
-  const FootTrajectory& trajectory = plan.foot(MovingFoot(kind));
-  decision.turn_rad = trajectory.turn_rad[2];
-  decision.height_m = trajectory.height_m[2];
-  decision.normal = trajectory.normals[1];
-  decision.lift_m = trajectory.lift_m;
-  decision.aside_m = trajectory.aside_m;
-  decision.root_shift_m = trajectory.root_shift_m;
-  return decision;
-}
-
-FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement, double time_s,
-                      ConstPoseSpan pose) {
-  FootLocks locks;
-  LegPose leg;
-  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
-    const FootCorrection correction = CorrectFoot(
-        movement, foot, time_s, FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg));
-    FootLock& lock = locks[static_cast<std::size_t>(foot)];
-    const FootTrajectory& trajectory = movement.feet.foot(foot);
-    lock.print = time_s > trajectory.release_s ? trajectory.to : trajectory.from;
-    lock.height_m = correction.offset_m.y;
-    lock.turn_rad = correction.free_turn_rad;
-    lock.normal = correction.normal;
-    lock.root_weight = correction.root_weight;
-  }
-  return locks;
+void LiftWhileSettling(const FootPlanJob& job) {
+  const FootPlan& plan = job.movement.feet;
+  if (!plan.is_active || plan.keeps_above_ground) return;
+  if (IsStep(job.library.group(job.movement.group).kind)) Planner(job).LiftWhileSettling();
 }
 
 }  // namespace stridewire

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+
+#include "runtime/movement/movement.h"
+#include "runtime/skeleton/leg_rig.h"
+#include "runtime/terrain/foot_support.h"
+#include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/terrain.h"
+
+namespace stridewire {
+
+/// Position and heading of a foot that stands between two movements, and the corrections that
+/// planting adds to the blended foot there.
+struct FootLock {
+  Footprint print;
+  double height_m = 0.0;
+  double turn_rad = 0.0;
+  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
+  double root_weight = 0.5;
+};
+using FootLocks = std::array<FootLock, 2>;  ///< [foot]
+
+/// Locks the feet where an unplanted pose has them, on the ground below them or, without terrain,
+/// at height `ground_m`.
+[[nodiscard]] FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
+                                    double ground_m, const Terrain* terrain);
+
+/// Returns how the ground would support a foot on a footprint.
+[[nodiscard]] FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side,
+                                    const Footprint& print);
+
+/// Turns `movement` into one in which both feet stay locked.
+void StandOn(const FootLocks& locks, Movement& movement);
+
+/// Returns the foot locks at a time of a planned movement at which both feet stand. `pose` is the
+/// blended pose with its difference pose at that time.
+[[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
+                                    double time_s, ConstPoseSpan pose);
+
+/// Returns the additional height of the ball's centre above the ground on a slope. The centre is at
+/// a fixed distance from the ground plane, so the vertical distance grows with the slope.
+[[nodiscard]] double SlopeRise(const LegRig::Side& side, const Vec3& normal);
+
+/// Sets the height and the ground normal of a trajectory's landing from the ground there.
+void LandOnGround(const Terrain& terrain, const LegRig::Side& side, FootTrajectory& trajectory);
+
+}  // namespace stridewire
