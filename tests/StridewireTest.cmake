@@ -12,12 +12,8 @@ function(stridewire_test name)
                         ${ARGN})
   add_executable(${name} ${ARG_SOURCES} ${ARG_SKIP_UNITY_BUILD})
   set_source_files_properties(${ARG_SKIP_UNITY_BUILD} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} stridewire_core_internal
+  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} test_support stridewire_core_internal
                         GTest::gtest GTest::gmock GTest::gtest_main)
-  target_compile_definitions(${name} PRIVATE
-    STRIDEWIRE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
-    STRIDEWIRE_MOCAP_DIR="${PROJECT_SOURCE_DIR}/../shared/mocap")
-  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support)
   stridewire_target(${name})
   stridewire_optimize_less(${name})
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${STRIDEWIRE_UNITY_BUILD}

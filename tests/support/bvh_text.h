@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "test_paths.h"
+
 namespace stridewire::test {
 
 /// Generates BVH text of a small walking figure. Each member controls one property of the file.
@@ -161,8 +163,8 @@ struct BvhText {
 /// Returns the external captures; empty if they are not available.
 inline std::vector<std::filesystem::path> SharedCaptures() {
   std::vector<std::filesystem::path> paths;
-  if (std::filesystem::is_directory(STRIDEWIRE_MOCAP_DIR)) {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(STRIDEWIRE_MOCAP_DIR)) {
+  if (std::filesystem::is_directory(MocapDir())) {
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(MocapDir())) {
       if (entry.path().extension() == ".bvh") paths.push_back(entry.path());
     }
   }

@@ -8,11 +8,9 @@
 #include <vector>
 
 #include "stridewire/offline/bvh_reader.h"
+#include "test_paths.h"
 
 namespace stridewire {
-
-/// Folder of the external captures for tests. They are not part of the project.
-inline std::filesystem::path MocapDir() { return STRIDEWIRE_MOCAP_DIR; }
 
 /// Returns all BVH files in a folder below MocapDir(), sorted by name; empty if it does not exist.
 inline std::vector<std::filesystem::path> MocapFiles(const std::string& folder) {

@@ -6,12 +6,12 @@
 #include "message_json.h"
 #include "protocol_testing.h"
 #include "sample_messages.h"
+#include "test_paths.h"
 
 namespace stridewire::protocol {
 namespace {
 
-const std::filesystem::path kDirectory =
-    std::filesystem::path(STRIDEWIRE_SOURCE_DIR) / "protocol" / "vectors";
+const std::filesystem::path kDirectory = SourceDir() / "protocol" / "vectors";
 
 std::string Read(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);

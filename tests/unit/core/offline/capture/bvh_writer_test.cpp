@@ -144,8 +144,7 @@ TEST(WriteBvh, AnglesAreContinuous) {
 TEST(WriteBvh, RoundTripsEveryCapture) {
   std::vector<std::filesystem::path> paths = test::SharedCaptures();
   if (paths.empty()) paths = test::PackagedCaptures();
-  if (paths.empty())
-    GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR " and no assimp-testmodels";
+  if (paths.empty()) GTEST_SKIP() << "no captures at " << MocapDir() << " and no assimp-testmodels";
   for (const std::filesystem::path& path : paths) {
     SCOPED_TRACE(path.string());
     const Expected<Capture> capture = ReadBvh(path);

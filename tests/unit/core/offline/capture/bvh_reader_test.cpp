@@ -126,7 +126,7 @@ constexpr double kCmuUnit = 0.0254 / 0.45;
 
 TEST(ReadBvh, ReadsAllSharedCaptures) {
   const std::vector<std::filesystem::path> paths = test::SharedCaptures();
-  if (paths.empty()) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
+  if (paths.empty()) GTEST_SKIP() << "no captures at " << MocapDir();
   EXPECT_GE(paths.size(), 37u);
   for (const std::filesystem::path& path : paths) {
     SCOPED_TRACE(path.string());
@@ -168,10 +168,10 @@ TEST(ReadBvh, DetectsPropertiesOfDifferentFiles) {
       {"other/pymo/AV_8Walk_Meredith_HVHA_Rep1.bvh", 23, 1064, 120, 0.0254, 0, kCmuLeg},
       {"other/animated-drawings/zombie.bvh", 27, 779, 30, 0.0398, 0, kCmuLeg},
   };
-  if (test::SharedCaptures().empty()) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
+  if (test::SharedCaptures().empty()) GTEST_SKIP() << "no captures at " << MocapDir();
   for (const FileFacts& e : expected) {
     SCOPED_TRACE(e.path);
-    const Expected<Capture> capture = ReadBvh(std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / e.path);
+    const Expected<Capture> capture = ReadBvh(MocapDir() / e.path);
     ASSERT_TRUE(capture.has_value()) << Describe(capture.error());
     EXPECT_EQ(capture->skeleton.joint_count(), e.joints);
     EXPECT_EQ(capture->clip.frame_count(), e.frames);
@@ -187,8 +187,8 @@ TEST(ReadBvh, DetectsPropertiesOfDifferentFiles) {
 
 // The same take in two units must give the same positions.
 TEST(ReadBvh, IsIndependentOfTheUnit) {
-  const std::filesystem::path folder = std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / "other/max";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
+  const std::filesystem::path folder = MocapDir() / "other/max";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no captures at " << MocapDir();
   const Expected<Capture> a = ReadBvh(folder / "131_01.bvh");
   const Expected<Capture> b = ReadBvh(folder / "scaled_131_01.bvh");
   ASSERT_TRUE(a.has_value() && b.has_value());
@@ -206,9 +206,8 @@ TEST(ReadBvh, IsIndependentOfTheUnit) {
 }
 
 TEST(ReadBvh, NotesTooLongFrameTime) {
-  const std::filesystem::path path =
-      std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / "other/amc2bvh/16_02.bvh";
-  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
+  const std::filesystem::path path = MocapDir() / "other/amc2bvh/16_02.bvh";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << "no captures at " << MocapDir();
   const Expected<Capture> slow = ReadBvh(path);
   ASSERT_TRUE(slow.has_value());
   EXPECT_THAT(slow->notes, Contains(HasSubstr("Frame Time 0.033333 s may be too long")));
@@ -333,10 +332,10 @@ TEST(ReadBvh, AgreesWithAReferenceReader) {
       {"cmu/16/16_27.bvh", false},     {"cmu/06/06_08.bvh", false},
       {"other/daz/13_13.bvh", false},  {"other/pymo/AV_8Walk_Meredith_HVHA_Rep1.bvh", false},
       {"other/max/131_01.bvh", false}, {"other/animated-drawings/zombie.bvh", true}};
-  if (test::SharedCaptures().empty()) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
+  if (test::SharedCaptures().empty()) GTEST_SKIP() << "no captures at " << MocapDir();
   for (const File& file : files) {
     SCOPED_TRACE(file.path);
-    const std::filesystem::path path = std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / file.path;
+    const std::filesystem::path path = MocapDir() / file.path;
     const Expected<Capture> capture = ReadBvh(path);
     ASSERT_TRUE(capture.has_value());
     const ReferenceReading plain = ReadReference(path);
