@@ -16,7 +16,7 @@ void EvaluateMovementByReference(const MotionGroup& group, const GridLayout& lay
 void EvaluateMovementBySampling(const MotionGroup& group, const GridLayout& layout,
                                 const Movement& movement, double time_s, PoseSpan out);
 
-/// PlantFeet without SIMD, in double precision. PlantFeet is within 2e-5 m and rad of it.
+/// PlantFeet without SIMD, in double precision. PlantFeet is within 2e-5 m and 2e-4 rad of it.
 void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
                           double time_s, PoseSpan pose);
 
