@@ -120,7 +120,7 @@ inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;
 /// Largest magnitude of a coordinate of a goal, waypoint or footprint.
 inline constexpr double kMaxWalkPositionM = 1e6;
-inline constexpr double kMaxWalkHeadingRad = 1e4;  ///< Heading of a goal or footprint, magnitude.
+inline constexpr double kMaxWalkHeadingRad = 1e4;  ///< Largest magnitude of a heading.
 inline constexpr double kMinWalkSpeedMPerS = 0.05;
 inline constexpr double kMaxWalkSpeedMPerS = 5.0;
 inline constexpr std::size_t kMaxWaypoints = 64;

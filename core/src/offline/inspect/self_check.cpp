@@ -288,7 +288,7 @@ class Checker {
     return true;
   }
 
-  // Measures the legs of libraries without steps in a jump of mean length.
+  // Plays a jump of mean length to measure the legs, if the library has no steps.
   void PlayJump() {
     if (legs_.feet > 0 || !summary_.jumps.is_available()) return;
     const double length_m = 0.5 * (summary_.jumps.range.min + summary_.jumps.range.max);

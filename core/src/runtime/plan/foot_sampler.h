@@ -36,9 +36,10 @@ class FootSampler {
   [[nodiscard]] BlendedFoot FootAt(std::size_t i, Foot foot) const;
   /// Returns the height of a foot at the `i`th time, in world space (LegPose::LowestSole).
   [[nodiscard]] double LowestSole(std::size_t i, Foot foot) const;
-  /// Returns the same without the tip of the toes.
+  /// Returns the height of the lower of ball and ankle, above their heights at rest.
   [[nodiscard]] double LowestFlatSole(std::size_t i, Foot foot) const;
-  /// Returns the same if the tip of the toes may not be lower than the rest of the sole.
+  /// Returns the height of the lowest of ball, ankle and tip of the toes, above their heights at
+  /// rest.
   [[nodiscard]] double LowestPoint(std::size_t i, Foot foot) const;
 
  private:

@@ -15,7 +15,8 @@ inline constexpr std::size_t kEarlyLift = 0;
 inline constexpr std::size_t kMiddleLift = 1;
 
 /// Fractions of the swing at which clearance is checked, closest together where the foot passes the
-/// edges of treads. Closer to its footprints, LiftOutOfGround keeps the foot above their ground.
+/// edges of treads. Closer to its footprints, planting keeps the foot above their ground
+/// (FootPlan::keeps_above_ground).
 inline constexpr std::array<double, 20> kClearanceSamples{0.09, 0.13, 0.16, 0.19, 0.22, 0.25, 0.28,
                                                           0.32, 0.37, 0.43, 0.49, 0.55, 0.61, 0.66,
                                                           0.71, 0.76, 0.8,  0.84, 0.88, 0.91};
