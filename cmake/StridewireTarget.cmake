@@ -13,6 +13,9 @@ function(stridewire_target target)
                          $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
   # Designated initializers leave other members at their defaults on purpose, but g++ 12 warns.
   target_compile_options(${target} PRIVATE -Wno-missing-field-initializers)
+  # __FILE__ is relative to the project, so that clones in other folders share the compiler cache,
+  # and programs do not contain the path of the machine that built them.
+  target_compile_options(${target} PRIVATE -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=)
   if(STRIDEWIRE_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()
