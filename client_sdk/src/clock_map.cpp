@@ -41,6 +41,7 @@ void ClockMap::AddSample(double local_s, double server_s) {
   }
   at_local_s_ = local_s;
   target_offset_s_ = smallest_s;
+  lateness_s_ = offset_s - smallest_s;
 }
 
 double ClockMap::OffsetAt(double local_s) const {

@@ -29,6 +29,9 @@ class ClockMap {
 
   [[nodiscard]] bool ready() const { return ready_; }
 
+  /// Delay of the last message relative to the fastest message of the last kWindowS.
+  [[nodiscard]] double last_lateness_s() const { return lateness_s_; }
+
   /// Returns the server time at `local_s`. Requires ready().
   [[nodiscard]] double ServerTime(double local_s) const;
 
@@ -49,6 +52,7 @@ class ClockMap {
   double at_local_s_ = 0.0;  ///< Local time for which `offset_s_` is valid.
   double offset_s_ = 0.0;
   double target_offset_s_ = 0.0;  ///< Smallest offset in the window.
+  double lateness_s_ = 0.0;
 };
 
 }  // namespace stridewire::client

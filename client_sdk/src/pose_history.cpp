@@ -70,6 +70,33 @@ Quat Near(const Quat& q, const Quat& reference) { return Dot(q, reference) < 0.0
 
 }  // namespace
 
+void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
+                     std::span<Quat> rotations) {
+  const auto& [before_s, start_s, end_s, beyond_s] = keys.times_s;
+  const double length_s = end_s - start_s;
+  // The slopes at start and end are those of the secants through their neighbours, scaled to the
+  // interval.
+  const auto scale_start = static_cast<float>(length_s / (end_s - before_s));
+  const auto scale_end = static_cast<float>(length_s / (beyond_s - start_s));
+  const Hermite h(static_cast<float>((time_s - start_s) / length_s));
+
+  const Vec3& start_m = keys.start.root_position_m;
+  const Vec3& end_m = keys.end.root_position_m;
+  root_position_m = start_m + h.value_1 * (end_m - start_m) +
+                    h.slope_0 * scale_start * (end_m - keys.before.root_position_m) +
+                    h.slope_1 * scale_end * (keys.beyond.root_position_m - start_m);
+
+  for (std::size_t joint = 0; joint < rotations.size(); ++joint) {
+    const Quat at_start = keys.start.rotations[joint];
+    const Quat at_before = Near(keys.before.rotations[joint], at_start);
+    const Quat at_end = Near(keys.end.rotations[joint], at_start);
+    const Quat at_beyond = Near(keys.beyond.rotations[joint], at_end);
+    rotations[joint] = Normalise(at_start + (at_end - at_start) * h.value_1 +
+                                 (at_end - at_before) * (h.slope_0 * scale_start) +
+                                 (at_beyond - at_start) * (h.slope_1 * scale_end));
+  }
+}
+
 std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& root_position_m,
                                                         std::span<Quat> rotations) const {
   std::size_t after = 0;
@@ -93,37 +120,19 @@ std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& roo
     return Sampled{i, exact};
   }
 
-  // The slopes at i and j are those of the secants before -> j and i -> after next, scaled to the
-  // interval. If a neighbour is missing, i or j takes its place, which results in the secant of the
-  // interval.
+  // If a neighbour is missing, i or j takes its place, which results in the secant of the interval.
   const std::size_t before = i > 0 && !stamp(i).discontinuity ? i - 1 : i;
   const std::size_t beyond = j + 1 < size_ && !stamp(j + 1).discontinuity ? j + 1 : j;
-  const double length_s = stamp(j).time_s - stamp(i).time_s;
-  const auto ratio = [&](std::size_t from, std::size_t to) {
-    return static_cast<float>(length_s / (stamp(to).time_s - stamp(from).time_s));
+  const auto pose = [this](std::size_t k) {
+    return ConstPoseSpan{this->root_position_m(k), this->rotations(k)};
   };
-  const float scale_i = ratio(before, j);
-  const float scale_j = ratio(i, beyond);
-  const Hermite h(static_cast<float>((time_s - stamp(i).time_s) / length_s));
-
-  root_position_m =
-      this->root_position_m(i) + h.value_1 * (this->root_position_m(j) - this->root_position_m(i)) +
-      h.slope_0 * scale_i * (this->root_position_m(j) - this->root_position_m(before)) +
-      h.slope_1 * scale_j * (this->root_position_m(beyond) - this->root_position_m(i));
-
-  const auto q_before = this->rotations(before);
-  const auto q_i = this->rotations(i);
-  const auto q_j = this->rotations(j);
-  const auto q_beyond = this->rotations(beyond);
-  for (std::size_t joint = 0; joint < joint_count_; ++joint) {
-    const Quat at_i = q_i[joint];
-    const Quat at_before = Near(q_before[joint], at_i);
-    const Quat at_j = Near(q_j[joint], at_i);
-    const Quat at_beyond = Near(q_beyond[joint], at_j);
-    rotations[joint] =
-        Normalise(at_i + (at_j - at_i) * h.value_1 + (at_j - at_before) * (h.slope_0 * scale_i) +
-                  (at_beyond - at_i) * (h.slope_1 * scale_j));
-  }
+  InterpolatePose(
+      {.times_s = {stamp(before).time_s, stamp(i).time_s, stamp(j).time_s, stamp(beyond).time_s},
+       .before = pose(before),
+       .start = pose(i),
+       .end = pose(j),
+       .beyond = pose(beyond)},
+      time_s, root_position_m, rotations);
   return Sampled{i, true};
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -8,8 +9,25 @@
 
 #include "pose_stamp.h"
 #include "stridewire/base/math.h"
+#include "stridewire/runtime/pose.h"
 
 namespace stridewire::client {
+
+/// Four poses for cubic interpolation in an interval: before it, at its start, at its end, and
+/// after it. If there is no pose before or after the interval, use the start or the end again.
+struct PoseKeys {
+  std::array<double, 4> times_s;
+  ConstPoseSpan before;
+  ConstPoseSpan start;
+  ConstPoseSpan end;
+  ConstPoseSpan beyond;
+};
+
+/// Computes the pose at `time_s` inside the interval by cubic Hermite interpolation, which is
+/// continuous in its first derivative and exact at the keys. Rotations are interpolated in one
+/// hemisphere and normalized.
+void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
+                     std::span<Quat> rotations);
 
 /// Jitter buffer: the last poses of one avatar, the oldest first. It allocates in its constructor
 /// only. A full buffer drops its oldest pose.

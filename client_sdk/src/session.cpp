@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "base/check.h"
@@ -51,23 +52,37 @@ void Session::OnConnected(double now_s) {
   }
 }
 
+bool Session::Receives() const { return state_ == State::kGreeting || state_ == State::kReady; }
+
+bool Session::HandleFrame(const protocol::FrameView& frame, double now_s) {
+  const std::uint64_t connection = connection_number_;
+  auto message = protocol::DecodeMessage(frame);
+  if (!message) {
+    LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(message.error()), now_s);
+    return false;
+  }
+  std::visit([&](const auto& m) { Handle(m, now_s); }, *message);
+  return connection == connection_number_ && Receives();
+}
+
+void Session::OnFrame(std::span<const std::byte> frame, double now_s) {
+  if (!Receives()) return;
+  heard_s_ = now_s;
+  bytes_received_ += frame.size();
+  const auto view = protocol::ParseFrame(frame, protocol::Sender::kServer);
+  if (!view) return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(view.error()), now_s);
+  if (HandleFrame(*view, now_s)) Pump();
+}
+
 void Session::OnBytes(std::span<const std::byte> bytes, double now_s) {
-  if (state_ != State::kGreeting && state_ != State::kReady) return;
+  if (!Receives()) return;
   heard_s_ = now_s;
   bytes_received_ += bytes.size();
-  const std::uint64_t connection = connection_number_;
   for (;;) {
     auto frame = reader_->Next(bytes);
     if (!frame) return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(frame.error()), now_s);
     if (!*frame) break;
-    auto message = protocol::DecodeMessage(**frame);
-    if (!message)
-      return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(message.error()), now_s);
-    std::visit([&](const auto& m) { Handle(m, now_s); }, *message);
-    if (connection != connection_number_ ||
-        (state_ != State::kGreeting && state_ != State::kReady)) {
-      return;
-    }
+    if (!HandleFrame(**frame, now_s)) return;
   }
   Pump();
 }
@@ -94,10 +109,16 @@ void Session::AdvanceTime(double now_s) {
       }
       break;
     case State::kReady:
+      std::erase_if(inspections_, [&](const auto& entry) { return now_s >= entry.second; });
       if (limits_.idle_timeout_s > 0.0 && now_s - heard_s_ > limits_.idle_timeout_s) {
         LoseConnection(STRIDEWIRE_TIMEOUT, "the server sent nothing for too long", now_s);
-      } else if (now_s >= next_ping_s_ && output_.size() < kMaxOutputBytes) {
-        SendPing(now_s);
+      } else if (now_s >= next_ping_s_) {
+        // A full output buffer is sent before any ping, and reaches the server as well.
+        if (output_.size() < kMaxOutputBytes) {
+          SendPing(now_s);
+        } else {
+          SchedulePing(now_s);
+        }
       }
       break;
     case State::kClosing:
@@ -108,6 +129,22 @@ void Session::AdvanceTime(double now_s) {
       break;
     default: break;
   }
+}
+
+double Session::NextTime() const {
+  switch (state_) {
+    case State::kWaiting: return next_attempt_s_;
+    case State::kConnecting:
+    case State::kGreeting:
+    case State::kClosing: return deadline_s_;
+    case State::kReady:
+      return limits_.idle_timeout_s > 0.0
+                 ? std::min(next_ping_s_, heard_s_ + limits_.idle_timeout_s)
+                 : next_ping_s_;
+    case State::kIdle:
+    case State::kClosed: break;
+  }
+  return std::numeric_limits<double>::infinity();
 }
 
 bool Session::NeedsSocket() const {
@@ -131,6 +168,10 @@ void Session::OnOutputWritten() {
 void Session::SendPing(double now_s) {
   // Encoding does not fail, because the time is finite.
   (void)encoder_.Encode(protocol::Ping{++ping_nonce_, now_s}, output_);
+  SchedulePing(now_s);
+}
+
+void Session::SchedulePing(double now_s) {
   double interval_s = options_.ping_interval_s;
   if (limits_.idle_timeout_s > 0.0) interval_s = std::min(interval_s, limits_.idle_timeout_s / 3.0);
   next_ping_s_ = now_s + interval_s;
@@ -147,6 +188,7 @@ void Session::LoseConnection(stridewire_status status, std::string_view text, do
   next_attempt_s_ = now_s + backoff_.Next();
   output_.clear();
   pending_pings_.clear();
+  inspections_.clear();
   events_.Push(
       MakeEvent(was_ready ? STRIDEWIRE_EVENT_CONNECTION_LOST : STRIDEWIRE_EVENT_CONNECT_FAILED, 0,
                 status, last_text_));
@@ -176,6 +218,7 @@ void Session::Reset() {
   clock_.Reset();
   rtts_s_.clear();
   pending_pings_.clear();
+  inspections_.clear();
   output_.clear();
 }
 

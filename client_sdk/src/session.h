@@ -38,20 +38,31 @@ class Session : public SessionCommands {
   void StartConnecting(double now_s);
   void OnConnected(double now_s);
   void OnBytes(std::span<const std::byte> bytes, double now_s);
+  /// Same as OnBytes for transports that keep frames apart, such as WebSocket. `frame` must be one
+  /// complete frame and begin on a multiple of 8 bytes.
+  void OnFrame(std::span<const std::byte> frame, double now_s);
   /// Must be called when the attempt to connect has failed or the connection was lost.
   void OnLost(stridewire_status status, std::string_view text, double now_s);
   /// Handles timeouts and sends pings.
   void AdvanceTime(double now_s);
+  /// Returns the time at which ConnectDue or AdvanceTime has to be called next. Infinity: never.
+  [[nodiscard]] double NextTime() const;
   /// Returns whether the state needs a socket. If not, the network thread closes it.
   [[nodiscard]] bool NeedsSocket() const;
   /// Increases with every connection, so that late results of an old connection are recognized.
   [[nodiscard]] std::uint64_t connection_number() const { return connection_number_; }
+  /// Number of bytes that TakeOutput would return without sending further commands.
+  [[nodiscard]] std::size_t output_bytes() const { return output_.size(); }
   /// Moves the pending output to `bytes`. Returns false if there is none.
   [[nodiscard]] bool TakeOutput(std::vector<std::byte>& bytes);
   /// Must be called when the bytes from the last TakeOutput have been written.
   void OnOutputWritten();
 
  private:
+  /// Returns whether the session expects messages from the server.
+  [[nodiscard]] bool Receives() const;
+  /// Decodes and handles a frame. Returns false if that has ended the connection.
+  bool HandleFrame(const protocol::FrameView& frame, double now_s);
   void SetTerrainOf(stridewire_world handle, const std::optional<protocol::TerrainInfo>& terrain);
   void Handle(const protocol::Welcome& message, double now_s);
   void Handle(const protocol::WorldInfo& message, double now_s);
@@ -64,6 +75,7 @@ class Session : public SessionCommands {
   void Handle(const protocol::WorldTerrain& message, double now_s);
   void Handle(const protocol::Movements& message, double now_s);
   void Handle(const protocol::LibraryPiece& message, double now_s);
+  void Handle(const protocol::AvatarState& message, double now_s);
   void Handle(const protocol::Goodbye& message, double now_s);
   template <typename Message>
   /// Rejects messages that a server must not send.
@@ -80,6 +92,9 @@ class Session : public SessionCommands {
   void LoseConnection(stridewire_status status, std::string_view text, double now_s);
   void CloseWithError(stridewire_status status, std::string_view text);
   void SendPing(double now_s);
+  void SchedulePing(double now_s);
+  /// Updates the statistics of jitter after a message with poses.
+  void FollowJitter(double now_s);
 };
 
 }  // namespace stridewire::client

@@ -78,7 +78,9 @@ stridewire_status SessionCommands::JoinWorld(std::string_view name, protocol::Ro
   joined.name = name;
   joined.role = role;
   joined.join_command = command;
-  joined.view = std::make_unique<WorldView>(options_.pose_history, pose_budget_);
+  joined.view = std::make_unique<WorldView>(
+      options_.pose_history, pose_budget_,
+      PoseRecording(options_.recording_s, options_.max_recording_bytes));
   worlds_.emplace(world, std::move(joined));
   Pump();
   return STRIDEWIRE_OK;
@@ -194,6 +196,24 @@ stridewire_status SessionCommands::MoveRegion(std::uint32_t subscription, protoc
     return STRIDEWIRE_OK;
   }
   return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no region has this subscription number");
+}
+
+stridewire_status SessionCommands::Inspect(stridewire_world world, protocol::AvatarId avatar,
+                                           std::uint64_t& nonce) {
+  const auto found = worlds_.find(world);
+  if (state_ != State::kReady || found == worlds_.end() || found->second.server_id == 0) {
+    return Refuse(STRIDEWIRE_NOT_READY, "the world is not joined");
+  }
+  if (inspections_.size() >= kMaxInspections) {
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many inspections are unanswered");
+  }
+  const protocol::InspectAvatar query{++inspection_nonce_, found->second.server_id, avatar};
+  if (Status status = encoder_.Encode(query, output_); !status) {
+    return Refuse(ToStatus(status.error().code), Describe(status.error()));
+  }
+  nonce = query.nonce;
+  inspections_.emplace(nonce, heard_s_ + kInspectTimeoutS);
+  return STRIDEWIRE_OK;
 }
 
 stridewire_status SessionCommands::StopObserving(std::uint32_t subscription,

@@ -36,6 +36,14 @@ class SessionCommands : public SessionState {
                                std::uint64_t& command);
   stridewire_status StopObserving(std::uint32_t subscription, std::uint64_t& command);
 
+  /// Queries what an avatar is doing. The answer is an AvatarState message with `nonce`; there is
+  /// none if the connection is lost or kInspectTimeoutS passes. Fails with NOT_READY if the world
+  /// is not joined now, and with COMMANDS_FULL beyond kMaxInspections unanswered queries.
+  stridewire_status Inspect(stridewire_world world, protocol::AvatarId avatar,
+                            std::uint64_t& nonce);
+  static constexpr double kInspectTimeoutS = 10.0;
+  static constexpr std::size_t kMaxInspections = 64;
+
   /// Returns the next task for RunLibraryTask, if any. Report its result with OnLibraryTask.
   [[nodiscard]] std::optional<LibraryTask> TakeLibraryTask() { return libraries_.TakeTask(); }
   void OnLibraryTask(const std::string& hash,

@@ -215,6 +215,7 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
     // session.
     const bool exists = command.own && item.code == protocol::StatusCode::kAvatarExists;
     if ((item.code == protocol::StatusCode::kOk && !chosen) || exists) continue;
+    if (!options_.detailed_events && !command.own) continue;
     stridewire_event event =
         MakeEvent(STRIDEWIRE_EVENT_ITEM, command.world, ToStatus(item.code), item.text);
     event.command = command.id;
@@ -325,6 +326,7 @@ void Session::Handle(const protocol::PoseBatch& message, double now_s) {
   World* world = FindByServerId(message.info.world, handle);
   if (world == nullptr || !world->view->has_info() || world->subscriptions.empty()) return;
   clock_.AddSample(now_s, message.info.server_time_s);
+  FollowJitter(now_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, message.info.mode);
   if (Status status = world->view->Apply(message, every_n_ticks, counts_); !status) {
     LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
@@ -340,11 +342,29 @@ void Session::Handle(const protocol::Movements& message, double now_s) {
   World* world = FindByServerId(message.world, handle);
   if (world == nullptr || world->replicas == nullptr) return;
   clock_.AddSample(now_s, message.server_time_s);
+  FollowJitter(now_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, protocol::PoseMode::kMovement);
   if (Status status = world->view->Apply(message, *world->replicas, every_n_ticks, counts_);
       !status) {
     LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
   }
+}
+
+void Session::FollowJitter(double now_s) {
+  const double late_s = clock_.last_lateness_s();
+  jitter_s_ += (late_s - jitter_s_) / 64.0;
+  if (late_s >= worst_jitter_s_ || now_s - worst_jitter_at_s_ > ClockMap::kWindowS) {
+    worst_jitter_s_ = late_s;
+    worst_jitter_at_s_ = now_s;
+  }
+}
+
+void Session::Handle(const protocol::AvatarState& message, double now_s) {
+  if (state_ != State::kReady) {
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent AvatarState before Welcome",
+                          now_s);
+  }
+  inspections_.erase(message.nonce);  // The application reads the message itself.
 }
 
 void Session::Handle(const protocol::LibraryPiece& message, double now_s) {
@@ -372,6 +392,7 @@ void Session::Handle(const protocol::Events& message, double now_s) {
   for (const protocol::Event& e : message.events) {
     ++events_received_;
     FollowSpawned(*world, e);
+    if (!options_.detailed_events) continue;
     stridewire_event event = MakeEvent(ToEventType(e.type), handle, ToStatus(e.code), e.reason);
     event.avatar = e.avatar;
     event.request_id = e.request_id;

@@ -51,6 +51,24 @@ const WorldView* SessionState::FindWorld(stridewire_world world) const {
   return found == worlds_.end() ? nullptr : found->second.view.get();
 }
 
+WorldView* SessionState::FindWorld(stridewire_world world) {
+  const auto found = worlds_.find(world);
+  return found == worlds_.end() ? nullptr : found->second.view.get();
+}
+
+std::optional<SessionState::WorldState> SessionState::FindWorldState(stridewire_world world) const {
+  const auto found = worlds_.find(world);
+  if (found == worlds_.end()) return std::nullopt;
+  return found->second.state;
+}
+
+stridewire_world SessionState::FindHandle(protocol::WorldId id) const {
+  for (const auto& [handle, world] : worlds_) {
+    if (world.server_id == id) return handle;
+  }
+  return 0;
+}
+
 SessionState::World* SessionState::FindByServerId(protocol::WorldId id, stridewire_world& handle) {
   for (auto& [number, world] : worlds_) {
     if (world.server_id == id) {

@@ -33,10 +33,15 @@ struct SessionOptions {
   std::size_t max_command_bytes = std::size_t{64} << 20;
   std::size_t pose_history = 32;
   std::size_t max_pose_bytes = std::size_t{256} << 20;
+  double recording_s = 0.0;  ///< Length of the recording of each world. 0: none.
+  std::size_t max_recording_bytes = std::size_t{192} << 20;  ///< Memory of one world's recording.
   double connect_timeout_s = 5.0;
   double ping_interval_s = 1.0;
   double render_delay_s = 0.1;
   bool respawn = false;
+  /// True: items of replies and events of avatars become events. False: the application reads them
+  /// from the messages themselves.
+  bool detailed_events = true;
   std::string library_folder;  ///< Folder that caches libraries. Empty: no cache.
   std::uint64_t seed = 1;
 };
@@ -58,6 +63,9 @@ class SessionState {
     kClosed,
   };
 
+  /// State of a world. A world that does not exist has none.
+  enum class WorldState : std::uint8_t { kWanted, kJoining, kJoined, kRefused, kLeft };
+
   /// While more bytes than this wait for the socket, no further command is encoded.
   static constexpr std::size_t kMaxOutputBytes = std::size_t{1} << 20;
   static constexpr std::size_t kMaxWorlds = 256;
@@ -70,6 +78,10 @@ class SessionState {
   [[nodiscard]] EventQueue& events() { return events_; }
   /// Returns null if the world does not exist.
   [[nodiscard]] const WorldView* FindWorld(stridewire_world world) const;
+  [[nodiscard]] WorldView* FindWorld(stridewire_world world);
+  [[nodiscard]] std::optional<WorldState> FindWorldState(stridewire_world world) const;
+  /// Returns the world with a number of the server, or 0.
+  [[nodiscard]] stridewire_world FindHandle(protocol::WorldId id) const;
   /// Returns the terrain of an existing world, as last received.
   [[nodiscard]] const std::optional<protocol::TerrainInfo>& TerrainOf(
       stridewire_world world) const {
@@ -79,6 +91,10 @@ class SessionState {
   [[nodiscard]] double render_delay_s() const { return options_.render_delay_s; }
   [[nodiscard]] double tick_hz() const { return tick_hz_; }
   [[nodiscard]] stridewire_statistics Statistics() const;
+  /// Mean lateness of messages with poses, relative to the fastest message of the last seconds.
+  [[nodiscard]] double jitter_s() const { return jitter_s_; }
+  /// Largest lateness of the last seconds.
+  [[nodiscard]] double worst_jitter_s() const { return worst_jitter_s_; }
 
  protected:
   using CommandMessage =
@@ -101,7 +117,7 @@ class SessionState {
   };
 
   struct World {
-    enum class State : std::uint8_t { kWanted, kJoining, kJoined, kRefused, kLeft };
+    using State = WorldState;
     State state = State::kWanted;
     std::string name;
     protocol::Role role = protocol::Role::kController;
@@ -172,6 +188,9 @@ class SessionState {
   std::uint64_t ping_nonce_ = 0;
   /// Pings of the application that have no Pong yet; at most 64.
   std::set<std::uint64_t> pending_pings_;
+  /// Unanswered inspections by nonce, with the times at which they are given up.
+  std::map<std::uint64_t, double> inspections_;
+  std::uint64_t inspection_nonce_ = 0;
   std::optional<protocol::FrameReader> reader_;
   protocol::Encoder encoder_;
   std::vector<std::byte> output_;
@@ -187,6 +206,9 @@ class SessionState {
   std::uint64_t connects_ = 0;
   std::uint64_t resumes_ = 0;
   std::uint64_t connect_failures_ = 0;
+  double jitter_s_ = 0.0;
+  double worst_jitter_s_ = 0.0;
+  double worst_jitter_at_s_ = 0.0;
 };
 
 }  // namespace stridewire::client

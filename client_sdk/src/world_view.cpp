@@ -14,23 +14,26 @@ void WorldView::SetInfo(const protocol::WorldInfo& info) {
   skeleton_ = info.skeleton;
   library_hash_ = info.library_hash;
   layers_ = info.layers;
-  codecs_ = {};
-  if (!info.rotation_codes.empty()) {
-    std::vector<std::int16_t> parents;
-    for (const protocol::JointInfo& joint : skeleton_.joints) parents.push_back(joint.parent);
-    // The decoder has checked the codes and parents, so this does not fail.
-    if (auto codecs =
-            protocol::CompactCodecs::Make(info.rotation_codes, parents, info.reduced_joints)) {
-      codecs_ = *std::move(codecs);
-    }
-  }
+  codecs_ = MakeCodecs(info);
   scratch_.assign(skeleton_.joints.size(), kIdentityQuat);
+}
+
+std::shared_ptr<const protocol::CompactCodecs> WorldView::MakeCodecs(
+    const protocol::WorldInfo& info) {
+  if (info.rotation_codes.empty()) return nullptr;
+  std::vector<std::int16_t> parents;
+  for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
+  // The decoder has checked the codes and parents, so this does not fail.
+  auto codecs = protocol::CompactCodecs::Make(info.rotation_codes, parents, info.reduced_joints);
+  if (!codecs) return nullptr;
+  return std::make_shared<const protocol::CompactCodecs>(*std::move(codecs));
 }
 
 void WorldView::ClearPoses() {
   for (auto track = tracks_.begin(); track != tracks_.end();) track = Erase(track);
   shards_.clear();
   left_.clear();
+  newest_time_s_ = -std::numeric_limits<double>::infinity();
 }
 
 void WorldView::Clear() {
@@ -39,7 +42,8 @@ void WorldView::Clear() {
   skeleton_ = {};
   library_hash_.clear();
   layers_.clear();
-  codecs_ = {};
+  codecs_.reset();
+  recording_.Clear();
 }
 
 void WorldView::SetFilter(std::optional<std::set<protocol::AvatarId>> filter) {
@@ -54,6 +58,7 @@ WorldView::Tracks::iterator WorldView::Erase(Tracks::iterator track) {
   const std::size_t bytes = PoseHistory::Bytes(pose_history_, track->second.history->joint_count());
   STRIDEWIRE_CHECK(budget_.used_bytes >= bytes);
   budget_.used_bytes -= bytes;
+  if (!track->second.gone) ++revision_;
   return tracks_.erase(track);
 }
 
@@ -66,6 +71,7 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
                 info.joint_count);
   }
   ++counts.batches;
+  newest_time_s_ = std::max(newest_time_s_, info.server_time_s);
 
   const auto key = std::pair(info.shard, info.mode);
   if (!shards_.contains(key) && shards_.size() == kMaxShards) {
@@ -86,7 +92,7 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
   }
   ++shard.parts_seen;
 
-  protocol::PoseBatchReader reader(batch, codecs_.Find(info.mode));
+  protocol::PoseBatchReader reader(batch, codecs_ ? codecs_->Find(info.mode) : nullptr);
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
     const protocol::AvatarId avatar = batch.avatars[i];
     reader.Next();
@@ -108,6 +114,7 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
                           .detail = protocol::DetailOf(info.mode)};
     Push(*track, {info.shard, info.mode}, stamp, {root_position_m, scratch_}, counts);
   }
+  recording_.Add(batch, epoch_, codecs_);
   if (shard.parts_seen >= info.parts) MarkMissingAsGone(info);
   return {};
 }
@@ -122,6 +129,7 @@ WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
     STRIDEWIRE_CHECK(budget_.used_bytes <= budget_.limit_bytes);
     track = tracks_.emplace(avatar, Track{}).first;
     track->second.history = std::make_unique<PoseHistory>(pose_history_, joints);
+    ++revision_;
   }
   return &track->second;
 }
@@ -132,7 +140,7 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseS
   if (track.history->Push(stamp, pose.root_position_m, pose.rotations)) {
     ++counts.poses;
     track.epoch = epoch_;
-    track.gone = false;
+    SetGone(track, false);
     // The tick of a pose can repeat, if a second subscription contains the avatar.
   } else if (stamp.tick != track.seen_tick) {
     ++counts.refused;
@@ -159,6 +167,7 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
                 "the library has another number of joints than the skeleton");
   }
   ++counts.batches;
+  newest_time_s_ = std::max(newest_time_s_, movements.server_time_s);
   replica_every_n_ticks_ = std::max<std::uint64_t>(every_n_ticks, 1);
   replica_counts_ = &counts;
   const Status status = replicas.Apply(movements, *this);
@@ -182,7 +191,7 @@ void WorldView::MarkMissingAsGone(const protocol::PoseBatchInfo& info) {
     return EraseGone(info.server_time_s);
   }
   for (auto& [avatar, t] : tracks_) {
-    if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) t.gone = true;
+    if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) SetGone(t, true);
   }
   EraseGone(info.server_time_s);
 }
@@ -193,7 +202,35 @@ void WorldView::Leave(protocol::AvatarId avatar, std::uint64_t tick) {
 }
 
 void WorldView::Remove(protocol::AvatarId avatar) {
-  if (auto track = tracks_.find(avatar); track != tracks_.end()) track->second.gone = true;
+  if (auto track = tracks_.find(avatar); track != tracks_.end()) SetGone(track->second, true);
+}
+
+void WorldView::SetGone(Track& track, bool gone) {
+  if (track.gone == gone) return;
+  track.gone = gone;
+  ++revision_;
+}
+
+void WorldView::SampleAll(double time_s, CrowdPose& out, std::uint64_t& held) const {
+  const std::size_t joints = skeleton_.joints.size();
+  out.Resize(tracks_.size(), joints);
+  std::size_t count = 0;
+  ForEach([&](protocol::AvatarId avatar, const PoseHistory& history, bool is_gone) {
+    const bool is_after_newest = time_s > history.stamp(history.size() - 1).time_s;
+    if (is_gone && is_after_newest) return;
+    const auto rotations = std::span(out.rotations).subspan(count * joints, joints);
+    const auto sampled = history.Sample(time_s, out.roots_m[count], rotations);
+    if (!sampled) return;
+    const PoseStamp& stamp = history.stamp(sampled->index);
+    const bool exact = stamp.time_s == time_s;
+    int flags = CrowdFlagsOf(stamp);
+    if (!exact) flags &= ~kCrowdDiscontinuity;
+    if (!sampled->interpolated) flags |= kCrowdHeld;
+    if (!sampled->interpolated && is_after_newest) ++held;
+    out.avatars[count] = avatar;
+    out.flags[count++] = static_cast<std::uint8_t>(flags);
+  });
+  out.Resize(count, joints);
 }
 
 const PoseHistory* WorldView::Find(protocol::AvatarId avatar) const {

@@ -2,14 +2,17 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "pose_history.h"
+#include "pose_recording.h"
 #include "replica_set.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
@@ -40,8 +43,10 @@ class WorldView : public PoseSink {
     std::uint64_t missing = 0;  ///< Missing batches, estimated from gaps in the ticks.
   };
 
-  WorldView(std::size_t pose_history, PoseBudget& budget)
-      : pose_history_(pose_history), budget_(budget) {}
+  /// `recording` defines the limits of the view's recording. By default nothing is recorded.
+  WorldView(std::size_t pose_history, PoseBudget& budget,
+            PoseRecording recording = PoseRecording(0.0, 0))
+      : pose_history_(pose_history), budget_(budget), recording_(std::move(recording)) {}
   ~WorldView() override { Clear(); }
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
@@ -52,6 +57,10 @@ class WorldView : public PoseSink {
   [[nodiscard]] const protocol::SkeletonInfo& skeleton() const { return skeleton_; }
   [[nodiscard]] const std::string& library_hash() const { return library_hash_; }
   [[nodiscard]] const std::vector<std::string>& layers() const { return layers_; }
+
+  /// Returns the codecs for the compact poses of a world; null if the server sends none.
+  [[nodiscard]] static std::shared_ptr<const protocol::CompactCodecs> MakeCodecs(
+      const protocol::WorldInfo& info);
 
   /// Removes the description and all poses.
   void Clear();
@@ -87,6 +96,32 @@ class WorldView : public PoseSink {
 
   /// Returns the avatars that are not gone, in ascending order.
   [[nodiscard]] std::vector<protocol::AvatarId> Avatars() const;
+  /// Changes whenever the result of Avatars changes.
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
+
+  /// Calls `call(avatar, history, is_gone)` for every avatar with poses, in ascending order. Gone
+  /// avatars are included until their poses are erased.
+  template <typename Call>
+  void ForEach(const Call& call) const {
+    for (const auto& [avatar, track] : tracks_) {
+      if (track.history->size() > 0) call(avatar, *track.history, track.gone);
+    }
+  }
+
+  /// The received batches of the last seconds. Clear also clears them.
+  [[nodiscard]] PoseRecording& recording() { return recording_; }
+
+  /// Samples all avatars at a server time. Adds the number of poses after the newest received pose
+  /// of their avatar to `held`.
+  void SampleAll(double time_s, CrowdPose& out, std::uint64_t& held) const;
+
+  /// Returns whether the filter admits an avatar.
+  [[nodiscard]] bool Admits(protocol::AvatarId avatar) const {
+    return !filter_ || filter_->contains(avatar);
+  }
+
+  /// Server time of the newest message with poses; negative infinity if there was none.
+  [[nodiscard]] double newest_time_s() const { return newest_time_s_; }
 
  private:
   struct Track {
@@ -109,9 +144,7 @@ class WorldView : public PoseSink {
   void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
               ConstPoseSpan pose) override;
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
-  [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override {
-    return !filter_ || filter_->contains(avatar);
-  }
+  [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
   /// Finds or creates the track of an avatar. Returns null if there is no memory for it.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
@@ -122,6 +155,7 @@ class WorldView : public PoseSink {
   /// Erases avatars that have been gone for longer than kKeepGoneS.
   void EraseGone(double time_s);
   Tracks::iterator Erase(Tracks::iterator track);
+  void SetGone(Track& track, bool gone);
 
   std::size_t pose_history_;
   PoseBudget& budget_;
@@ -129,12 +163,15 @@ class WorldView : public PoseSink {
   protocol::SkeletonInfo skeleton_;
   std::string library_hash_;
   std::vector<std::string> layers_;
-  protocol::CompactCodecs codecs_;  ///< Codecs of compact poses.
+  std::shared_ptr<const protocol::CompactCodecs> codecs_;  ///< Codecs of compact poses, or null.
   std::optional<std::set<protocol::AvatarId>> filter_;
   Tracks tracks_;
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;
+  std::uint64_t revision_ = 0;
+  PoseRecording recording_;
+  double newest_time_s_ = -std::numeric_limits<double>::infinity();
   std::vector<Quat> scratch_;
   // Interval of poses in ticks, as requested. Set while Apply(Movements) runs.
   std::uint64_t replica_every_n_ticks_ = 1;

@@ -860,6 +860,97 @@ TEST_F(SessionTest, InvalidServerMessagesCloseTheConnection) {
   EXPECT_EQ(session_->state(), State::kReady);
 }
 
+// Transports that keep frames apart, such as WebSocket, pass exactly one frame at a time.
+TEST_F(SessionTest, FramesMustBeComplete) {
+  std::vector<std::byte> pong;
+  ASSERT_TRUE(encoder_.Encode(protocol::Pong{1, 0.5, 1.0, 3}, pong));
+  (void)Joined();
+  session_->OnFrame(pong, now_s_);
+  EXPECT_EQ(session_->state(), State::kReady);
+  std::vector<std::byte> two = pong;
+  two.insert(two.end(), pong.begin(), pong.end());
+  for (const auto& bytes : {std::vector<std::byte>(pong.begin(), pong.end() - 8), two,
+                            std::vector<std::byte>(8), std::vector<std::byte>()}) {
+    Use({});
+    (void)Joined();
+    session_->OnFrame(bytes, now_s_);
+    EXPECT_EQ(session_->state(), State::kWaiting) << bytes.size();
+    EXPECT_EQ(session_->last_status(), STRIDEWIRE_PROTOCOL_ERROR);
+  }
+}
+
+TEST_F(SessionTest, StatesTheTimeOfItsNextAction) {
+  EXPECT_EQ(session_->NextTime(), std::numeric_limits<double>::infinity());
+  ASSERT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->NextTime(), now_s_);
+  Ready();
+  int actions = 0;
+  for (const double end_s = now_s_ + 20.0; session_->NextTime() < end_s; ++actions) {
+    ASSERT_GE(session_->NextTime(), now_s_);
+    now_s_ = session_->NextTime();
+    session_->AdvanceTime(now_s_);
+    ASSERT_LT(actions, 1000);
+  }
+  EXPECT_EQ(session_->state(), State::kReady);
+  (void)Sent();
+  EXPECT_GE(pings_, 19);
+}
+
+TEST_F(SessionTest, InspectionsAreBoundedAndEndWithTheConnection) {
+  const stridewire_world world = Joined();
+  std::uint64_t nonce = 0;
+  for (std::size_t i = 0; i < Session::kMaxInspections; ++i) {
+    ASSERT_EQ(session_->Inspect(world, 3, nonce), STRIDEWIRE_OK);
+    EXPECT_EQ(nonce, i + 1);
+  }
+  EXPECT_EQ(session_->Inspect(world, 3, nonce), STRIDEWIRE_COMMANDS_FULL);
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), Session::kMaxInspections);
+  const auto& query = std::get<protocol::InspectAvatar>(sent[0]);
+  EXPECT_EQ(query.world, 5u);
+  EXPECT_EQ(query.avatar, 3u);
+  protocol::AvatarState state;
+  state.nonce = query.nonce;
+  state.world = 5;
+  state.avatar = 3;
+  Receive(state);
+  EXPECT_EQ(session_->Inspect(world, 3, nonce), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Inspect(world, 3, nonce), STRIDEWIRE_COMMANDS_FULL);
+  now_s_ += Session::kInspectTimeoutS;
+  session_->AdvanceTime(now_s_);
+  EXPECT_EQ(session_->Inspect(world, 3, nonce), STRIDEWIRE_OK);
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  EXPECT_EQ(session_->Inspect(world, 3, nonce), STRIDEWIRE_NOT_READY);
+}
+
+// The web client reads items and events of avatars from the messages itself.
+TEST_F(SessionTest, DetailedEventsCanBeDisabled) {
+  Use({.detailed_events = false});
+  const stridewire_world world = Joined();
+  ASSERT_EQ(session_->Spawn(world, SpawnOf({0, 4}), command_), STRIDEWIRE_OK);
+  (void)Sent();
+  (void)Events();
+  protocol::Reply reply = test_world::Ok(2);
+  reply.items = {{0, 41, 0, protocol::StatusCode::kOk, ""},
+                 {1, 4, 0, protocol::StatusCode::kAvatarExists, ""}};
+  Receive(reply);
+  protocol::Event event;
+  event.avatar = 41;
+  Receive(protocol::Events{5, 1, 10, {event}});
+  EXPECT_THAT(EventTypes(), testing::ElementsAre(STRIDEWIRE_EVENT_REPLY));
+  EXPECT_EQ(session_->Statistics().events_received, 1u);
+}
+
+TEST_F(SessionTest, FindsWorldsByTheNumberOfTheServer) {
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->FindHandle(5), world);
+  EXPECT_EQ(session_->FindHandle(6), 0u);
+  EXPECT_EQ(session_->FindWorldState(world), Session::WorldState::kJoined);
+  EXPECT_FALSE(session_->FindWorldState(world + 1));
+  ASSERT_EQ(session_->LeaveWorld(world, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->FindWorldState(world), Session::WorldState::kLeft);
+}
+
 TEST_F(SessionTest, SurvivesMutatedFrames) {
   const std::uint64_t seed = 4242;
   SCOPED_TRACE(testing::Message() << "seed " << seed);

@@ -38,6 +38,53 @@ TEST_F(WorldViewTest, ListsAvatars) {
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{3}));
 }
 
+TEST_F(WorldViewTest, RevisionChangesWithTheListOfAvatars) {
+  std::uint64_t revision = view_.revision();
+  std::vector<std::uint32_t> avatars = view_.Avatars();
+  const auto changed = [&] {
+    const bool has_changed = std::exchange(revision, view_.revision()) != view_.revision();
+    EXPECT_EQ(std::exchange(avatars, view_.Avatars()) != view_.Avatars(), has_changed);
+    return has_changed;
+  };
+  ASSERT_TRUE(Take(1, {{3}, {1}}));
+  EXPECT_TRUE(changed());
+  ASSERT_TRUE(Take(2, {{3}, {1}}));
+  EXPECT_FALSE(changed());
+  ASSERT_TRUE(Take(3, {{3}}));
+  EXPECT_TRUE(changed());
+  view_.Remove(1);  // It is gone already.
+  EXPECT_FALSE(changed());
+  ASSERT_TRUE(Take(4, {{3}, {1}}));
+  EXPECT_TRUE(changed());
+  view_.SetFilter(std::set<protocol::AvatarId>{1});
+  EXPECT_TRUE(changed());
+  ASSERT_TRUE(Take(500, {}));
+  EXPECT_TRUE(changed());
+  ASSERT_TRUE(Take(1000, {}));  // Erases the avatar.
+  EXPECT_FALSE(changed());
+}
+
+TEST_F(WorldViewTest, SamplesAllAvatarsAtATime) {
+  ASSERT_TRUE(Take(60, {{2, protocol::kPoseStanding}, {1}}));
+  ASSERT_TRUE(Take(61, {{2, protocol::kPoseStanding}, {1}}));
+  ASSERT_TRUE(Take(62, {{2, protocol::kPoseStanding}}));
+  EXPECT_EQ(view_.newest_time_s(), test_world::TickTime(62));
+  CrowdPose crowd;
+  std::uint64_t held = 0;
+  view_.SampleAll(60.5 / 60.0, crowd, held);
+  EXPECT_EQ(crowd.avatars, (std::vector<std::uint32_t>{1, 2}));
+  EXPECT_EQ(crowd.flags, (std::vector<std::uint8_t>{0, kCrowdStanding}));
+  EXPECT_NEAR(crowd.roots_m[1].z, test_world::RootAt(60.5 / 60.0, 2).z, 1e-5f);
+  EXPECT_EQ(crowd.rotations.size(), 2u * test_world::kJoints);
+  EXPECT_EQ(held, 0u);
+  view_.SampleAll(62.5 / 60.0, crowd, held);  // Avatar 1 is gone.
+  EXPECT_EQ(crowd.avatars, std::vector<std::uint32_t>{2});
+  EXPECT_EQ(crowd.flags[0], kCrowdStanding | kCrowdHeld);
+  EXPECT_EQ(held, 1u);
+  view_.SampleAll(59.0 / 60.0, crowd, held);
+  EXPECT_TRUE(crowd.avatars.empty());
+}
+
 // Subscriptions of different modes can have different avatars.
 TEST_F(WorldViewTest, ModesAreIndependent) {
   constexpr auto kQuantised = protocol::PoseMode::kQuantised;

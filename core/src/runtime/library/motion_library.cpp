@@ -1,10 +1,13 @@
 #include "stridewire/runtime/motion_library.h"
 
-#include <fcntl.h>
 #include <flatbuffers/flatbuffers.h>
+
+#ifndef __wasm__
+#include <fcntl.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#endif
 
 #include <algorithm>
 #include <cerrno>
@@ -442,13 +445,22 @@ int MotionGroup::FindParameter(ParameterName name) const {
 
 MotionLibrary::~MotionLibrary() {
   auto* data = const_cast<std::byte*>(bytes_.data());
+#ifndef __wasm__
   if (is_mapped_) {
     munmap(data, bytes_.size());
-  } else {
-    std::free(data);
+    return;
   }
+#endif
+  std::free(data);
 }
 
+#ifdef __wasm__
+// WebAssembly maps no files. Its callers use FromBytes.
+Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
+    const std::filesystem::path& path) {
+  return Fail(ErrorCode::kUnsupported, "files cannot be opened in WebAssembly", path.string());
+}
+#else
 Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
     const std::filesystem::path& path) {
   const std::string where = path.string();
@@ -484,6 +496,7 @@ Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
   }
   return library;
 }
+#endif
 
 Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::FromBytes(
     std::span<const std::byte> bytes) {

@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "crowd_pose.h"
+#include "stridewire/protocol/compact_codecs.h"
+#include "stridewire/protocol/messages.h"
+
+namespace stridewire::client {
+
+/// The last seconds of a world as received, for replay. It stores the encoded batches and decodes
+/// only what is sampled.
+///
+///   stream (shard, or mode and shard of a region)
+///     ticks:    oldest ... [info, epoch, parts] ... newest     encoded
+///     decoded:  the last ticks that were sampled               poses
+class PoseRecording {
+ public:
+  /// Time after the last batch of its stream for which an avatar can be sampled, in seconds.
+  static constexpr double kKeepS = 2.0;
+
+  /// A recording of `length_s` seconds that stores at most `max_bytes` of batches. Either may be 0,
+  /// which disables it.
+  PoseRecording(double length_s, std::size_t max_bytes)
+      : length_s_(length_s), max_bytes_(max_bytes) {}
+
+  /// Adds a copy of a batch. Poses of different epochs are not interpolated. `codecs` decodes its
+  /// poses if they are compact. If a tick of a shard arrives in two modes, only the first is
+  /// stored. Batches of a region are an exception: those of different modes contain different
+  /// avatars.
+  void Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
+           const std::shared_ptr<const protocol::CompactCodecs>& codecs);
+
+  void Clear();
+
+  /// Returns the server time of the oldest recorded pose; NaN if the recording is empty.
+  [[nodiscard]] double first_time_s() const;
+  [[nodiscard]] double last_time_s() const { return last_time_s_; }
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+  /// Computes the poses at `time_s` of all avatars for which `wants` returns true. There are none
+  /// outside the recorded time. Like PoseHistory, it does not interpolate across discontinuities.
+  void SampleAll(double time_s, const std::function<bool(protocol::AvatarId)>& wants,
+                 CrowdPose& out);
+
+ private:
+  struct Part {
+    std::uint16_t number = 0;
+    std::vector<protocol::AvatarId> avatars;
+    std::vector<std::uint8_t> flags;
+    std::vector<std::byte> poses;
+  };
+  struct Tick {
+    protocol::PoseBatchInfo info;
+    std::uint64_t epoch = 0;
+    std::shared_ptr<const protocol::CompactCodecs> codecs;
+    std::vector<Part> parts;
+    std::size_t bytes = 0;
+  };
+  /// Decoded poses of a tick. The buffers are reused for other ticks.
+  struct Decoded {
+    const Tick* source = nullptr;  ///< Null: the buffers contain nothing.
+    std::uint64_t last_use = 0;
+    CrowdPose poses;  ///< In ascending order of the avatars.
+    [[nodiscard]] bool Find(protocol::AvatarId avatar, std::size_t& index) const;
+    [[nodiscard]] ConstPoseSpan pose(std::size_t i) const;
+  };
+  struct Stream {
+    std::deque<Tick> ticks;
+    std::vector<std::unique_ptr<Decoded>> decoded;
+  };
+  /// Ticks of a stream around a time. Pointers are null where no continuous tick exists.
+  struct Neighbours {
+    const Decoded* start = nullptr;
+    bool exact = false;  ///< True if `start` is exactly at the time; the others are then null.
+    const Decoded* end = nullptr;
+    const Decoded* before = nullptr;
+    const Decoded* beyond = nullptr;
+  };
+  /// Number of decoded ticks per stream. Playing in either direction needs four.
+  static constexpr std::size_t kMaxDecoded = 8;
+
+  const Decoded* Decode(Stream& stream, const Tick& tick);
+  static void Discard(Stream& stream, const Tick& tick);
+  [[nodiscard]] Neighbours FindNeighbours(Stream& stream, double time_s);
+  static void Interpolate(const Neighbours& around, double time_s, CrowdPose& out);
+  void DropOld();
+
+  double length_s_;
+  std::size_t max_bytes_;
+  std::map<std::int32_t, Stream> streams_;
+  std::size_t bytes_ = 0;
+  double last_time_s_ = std::numeric_limits<double>::quiet_NaN();
+  std::uint64_t use_count_ = 0;
+  std::vector<Neighbours> around_;
+  std::vector<std::size_t> order_;  // Scratch memory of Decode.
+  CrowdPose unsorted_;              // Scratch memory of Decode.
+};
+
+}  // namespace stridewire::client
