@@ -40,6 +40,15 @@ tests=(
   libgtest-dev
   librapidcheck-dev
 )
+# The web client contains core, protocol and session of the C++ client, compiled to WebAssembly.
+build+=(
+  clang-19
+  libc++-19-dev-wasm32
+  libc++abi-19-dev-wasm32
+  libclang-rt-19-dev-wasm32
+  lld-19
+  wasi-libc
+)
 # The web client and the viewer are built with npm. Debian's npm conflicts with a Node.js from
 # another source, so the script installs it only if there is no npm yet.
 command -v npm >/dev/null || build+=(nodejs npm)

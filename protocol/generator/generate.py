@@ -4,7 +4,7 @@
 KIND is one of:
   cpp   limits.h, message_type.h, message_structs.h, message_list.h, codec.h and codec.cpp
   json  fields_json.h and fields_json.cpp, for the test vectors
-  web   limits.ts, messages.ts, decoders.ts and tables.ts, for the web client
+  web   messages.ts and tables.ts, for the web client
 
 Files that would not change are left alone, so that nothing is compiled again.
 """
@@ -32,8 +32,7 @@ def files(schema, kind):
         return {"fields_json.h": json.header(), "fields_json.cpp": json.source()}
     if kind == "web":
         web = TypeScript(schema)
-        return {"limits.ts": web.limits(), "messages.ts": web.messages(),
-                "decoders.ts": web.decoders(), "tables.ts": web.tables()}
+        return {"messages.ts": web.messages(), "tables.ts": web.tables()}
     sys.exit(f"generate.py: unknown kind '{kind}'\n{__doc__}")
 
 

@@ -1,4 +1,4 @@
-"""Writes the TypeScript modules of the web client: limits, message interfaces and tables."""
+"""Writes the TypeScript modules of the web client: message interfaces and tables."""
 
 import json
 
@@ -19,14 +19,6 @@ class TypeScript:
 
     def head(self):
         return HEAD.format(schema=self.schema.path)
-
-    def limits(self):
-        lines = []
-        for f in self.schema.limits.values():
-            if f.doc:
-                lines.append("/** " + "\n * ".join(f.doc) + (" */" if len(f.doc) == 1 else "\n */"))
-            lines.append(f"export const {lower_camel(f.name)} = {f.default};")
-        return self.head() + "\n".join(lines) + "\n"
 
     # ---- names and types
 
@@ -83,7 +75,6 @@ class TypeScript:
                 for side in ("client", "server")}
         types_of_messages = "".join(f"  {m.name}: {m.get('message')},\n"
                                     for m in self.schema.messages)
-        bulk = ", ".join(repr(m.name) for m in self.schema.messages if "bulk" in m)
         return (self.head() + "import type {Parameters} from '../src/types';\n\n"
                 f"/** Values of each enum, in the order of their numbers. */\n"
                 f"export const enums = {{\n{enums}}} as const;\n{types}\n{interfaces}\n"
@@ -92,140 +83,7 @@ class TypeScript:
                 "export type Message = ClientMessage | ServerMessage;\n\n"
                 "/** Numbers of the message types. */\n"
                 f"export const MessageType = {{\n{types_of_messages}}} as const;\n"
-                "export type MessageName = keyof typeof MessageType;\n\n"
-                "/** Messages whose payload may have maxBulkBytes. */\n"
-                f"export const bulkMessages: readonly MessageName[] = [{bulk}];\n")
-
-    # ---- decoding
-
-    def number(self, value):
-        return f"{self.schema.number(value):.15g}"
-
-    def checked(self, f, value):
-        """Wraps a number in the checks that the attributes ask for."""
-        name = f"'{self.name_of(f)}'"
-        low, high = f.get("min"), f.get("max")
-        if "nonzero" in f:
-            value = f"r.nonzero({value}, {name})"
-        if low is not None or high is not None:
-            ends = [self.number(low) if low else "-Infinity",
-                    self.number(high) if high else "Number.MAX_VALUE"]
-            value = f"r.within({value}, {name}, {', '.join(ends)})"
-        elif "above" in f:
-            value = f"r.above({value}, {name}, {self.number(f.get('above'))})"
-        elif "below" in f:
-            value = f"r.within({value}, {name}, 0, {self.number(f.get('below'))} - 1)"
-        elif f.type in ("float", "double"):
-            value = f"r.finite({value}, {name})"
-        return value
-
-    def scalar(self, f, at):
-        if f.type in self.schema.enums:
-            values = self.schema.enums[f.type].values
-            last = values[f.get("max")] if "max" in f else len(values) - 1
-            return f"r.known(r.ubyte({at}, 0), enums.{f.type}, {last}, '{self.name_of(f)}')"
-        if f.type == "bool":
-            return f"{'!' if 'inverted' in f else ''}r.bool({at})"
-        if f.default == "null":
-            return f"{at} === 0 ? null : {self.checked(f, f'r.{f.type}({at}, 0)')}"
-        initial = f.default or "0"
-        if f.type == "ulong":
-            if "number" not in f:
-                return self.checked(f, f"r.ulong({at})")
-            return self.checked(f, f"Number(r.ulong({at}))")
-        return self.checked(f, f"r.{f.type}({at}, {initial})")
-
-    def read(self, f, at):
-        """The expression that reads a field at `at`; 0: it is absent."""
-        name = f"'{self.name_of(f)}'"
-        table = self.schema.tables.get(f.type)
-        if f.is_list or f.type == "string":
-            bounds = f"{self.number(f.get('min', '0'))}, {self.number(f.get('max'))}"
-            if f.type == "string":
-                return f"r.text({at}, {name}, {bounds})"
-            if table is not None and table.get("native") == "ParameterSet":
-                return f"r.parameters({at}, {name}, {bounds})"
-            if table is not None:
-                size = self.schema.inline_layout(f.type)
-                step = f"{size[0]}, {self.reader(table)}" if size else f"0, {self.reader(table)}"
-                return f"r.list({at}, {name}, {bounds}, {step})"
-            if enum := f.get("enumerators"):
-                return f"r.knownList({at}, {name}, {bounds}, enums.{enum})"
-            check = "'nonzero'" if "nonzero" in f else \
-                "'finite'" if f.type in ("float", "double") else "null"
-            return f"r.numbers({at}, {name}, {bounds}, {ARRAYS[f.type]}, {check})"
-        if table is None:
-            return self.scalar(f, at)
-        if self.is_tuple(table):
-            absent = f"{at} === 0 ? null : " if "optional" in f else ""
-            kind = table.fields[0].type
-            return f"{absent}r.vector{len(table.fields)}({at}, {name}, '{kind}')"
-        if table.is_struct:
-            self.schema.fail(f.line, f"{f.name}: a struct must be in a list or a vector x, y, z, w")
-        method = "optional" if "optional" in f else "child"
-        return f"r.{method}({at}, {name}, {self.reader(table)})"
-
-    def reader(self, table):
-        return f"read{table.name}"
-
-    def read_function(self, table):
-        member = self.only_member(table)
-        name = self.type_of(member) if member else f"m.{table.get('cpp', table.name)}"
-        lines, at = [], 0
-        for slot, f in enumerate(table.all_fields):
-            if table.is_struct:
-                size, align = self.schema.inline_layout(f.type)
-                at = -(-at // align) * align
-                place = f"at + {at}"
-                at += size
-            else:
-                place = f"r.at(at, {slot})"
-            if "deprecated" in f:
-                continue
-            value = self.read(f, place)
-            if "? null" in value or "only" in f:
-                used = " || ".join(f"type === '{lower_camel(name)}'"
-                                   for name in f.get("only", "").split())
-                value = self.read(f, "p")
-                place = f"{used} ? {place} : 0" if used else place
-                value = f"((p: number) => {value})({place})"
-            lines.append(f"    {self.name_of(f)}: {value},\n")
-        if member:
-            return (f"function {self.reader(table)}(r: Reader, at: number): {name} {{\n"
-                    f"  return {self.read(member, 'r.at(at, 0)')};\n}}\n")
-        tag = f"    type: '{table.name}',\n" if "message" in table else ""
-        before = ""
-        if any("only" in f for f in table.fields):
-            kind = next(i for i, f in enumerate(table.all_fields) if f.name == "type")
-            before = f"  const type = {self.read(table.all_fields[kind], f'r.at(at, {kind})')};\n"
-            lines[kind] = "    type,\n"
-        has_rule = "meaning" in table or table.by_hand("check")
-        rule = f"rules.{table.name}" if has_rule else ""
-        body = "{\n" + tag + "".join(lines) + "  }"
-        end = f"  return r.checked({body}, {rule});\n" if rule else f"  return {body};\n"
-        export = "export " if "message" in table else ""
-        return (f"{export}function {self.reader(table)}(r: Reader, at: number): {name} {{\n"
-                f"{before}{end}}}\n")
-
-    def decoders(self):
-        in_lists = {f.type for t in self.schema.tables.values() for f in t.fields if f.is_list}
-        functions = "\n".join(
-            self.read_function(t) for t in self.schema.tables.values()
-            if not self.is_tuple(t) and t.get("native") is None)
-        for t in self.schema.tables.values():
-            if self.is_tuple(t) and t.name in in_lists:
-                count, kind = len(t.fields), t.fields[0].type
-                functions += (f"\nfunction {self.reader(t)}(r: Reader, at: number) {{\n"
-                              f"  return r.vector{count}(at, '', '{kind}');\n}}\n")
-        names = "".join(f"  {m.name}: {self.reader(m)},\n" for m in self.schema.messages)
-        return (self.head() + "import {enums} from './messages';\n"
-                "import type * as m from './messages';\n"
-                "import type {Reader} from '../src/wire/reader';\n"
-                "import {rules} from '../src/wire/rules';\n\n" + functions +
-                "\n/** Reads the root table of a message. */\n"
-                "export const decoders: {\n"
-                "  readonly [name in m.MessageName]: (r: Reader, at: number) => m.Message\n"
-                "} = {\n" + names + "};\n")
+                "export type MessageName = keyof typeof MessageType;\n")
 
     # ---- tables
 
@@ -250,7 +108,11 @@ class TypeScript:
             info["list"] = True
         elif f.type not in self.schema.tables and f.type != "string":
             info["initial"] = None if f.default == "null" else float(f.default or 0)
-        return info | {name: True for name in ("deprecated", "inverted", "shared") if name in f}
+        table = self.schema.tables.get(f.type)
+        if table is not None and table.get("native") == "ParameterSet":
+            info["parameters"] = True
+        flags = ("deprecated", "inverted", "number", "optional", "shared")
+        return info | {name: True for name in flags if name in f}
 
     def table_info(self, table, numbers):
         fields = [self.field_info(f, numbers) for f in table.all_fields]
@@ -293,6 +155,12 @@ export interface FieldInfo {
   readonly deprecated?: boolean;
   /** The property is the opposite of the field. */
   readonly inverted?: boolean;
+  /** The 64-bit integer is a number instead of a bigint. */
+  readonly number?: boolean;
+  /** The table may be absent; it is then null. */
+  readonly optional?: boolean;
+  /** The list is an object of parameters. */
+  readonly parameters?: boolean;
   /** Equal texts of a message are stored once. */
   readonly shared?: boolean;
   /** Position in a struct. */

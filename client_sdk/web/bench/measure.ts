@@ -3,7 +3,7 @@ import WebSocket from 'ws';
 import {Client} from '../src/client';
 import {createCrowdPose} from '../src/pose_buffers';
 import type {CrowdPose, PoseMode} from '../src/types';
-import {decodeFrame} from '../src/wire/decode';
+import {decodeMessage} from '../src/testing';
 import {ServerProcess, until} from '../test/support/server_process';
 
 function median(values: number[]): number {
@@ -72,7 +72,7 @@ async function measure(mode: PoseMode, count: number): Promise<void> {
   const recorded = time(9, calls,
                         (i) => void world.recording.sampleAll(now - 2 + (i % 100) / 200, crowd));
   const checked = time(9, 10 * frames.length,
-                       (i) => void decodeFrame(frames[i % frames.length]!, 'server'));
+                       (i) => void decodeMessage(frames[i % frames.length]!, 'server'));
   console.log(JSON.stringify({
     mode,
     avatars: count,

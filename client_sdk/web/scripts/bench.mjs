@@ -8,6 +8,7 @@ await build({
   entryPoints: [`${folder}/bench/measure.ts`],
   outfile: `${folder}/build/measure.mjs`,
   bundle: true,
+  loader: {'.wasm': 'binary'},
   packages: 'external',
   platform: 'node',
   format: 'esm',

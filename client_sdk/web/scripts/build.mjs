@@ -2,6 +2,7 @@
 import {execFileSync} from 'node:child_process';
 import {mkdirSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
 import {createRequire} from 'node:module';
+import {dirname, join} from 'node:path';
 import {fileURLToPath} from 'node:url';
 import {build} from 'esbuild';
 
@@ -18,28 +19,39 @@ try {
 
 const copied = new Set();
 /**
- * Copies the declarations of a module and of the modules that it imports to dist/types. Sources
- * import modules without extension, but module resolution `nodenext` requires one.
+ * Copies the declarations of a module, for example `src/index`, and of the modules that it imports
+ * to dist/types. Sources import modules without extension, but module resolution `nodenext`
+ * requires one.
  */
 function copyTypes(name) {
   if (copied.has(name)) return;
   copied.add(name);
-  const text = readFileSync(`${folder}/build/types/src/${name}.d.ts`, 'utf8');
+  const text = readFileSync(`${folder}/build/types/${name}.d.ts`, 'utf8');
+  mkdirSync(dirname(`${folder}/dist/types/${name}`), {recursive: true});
   writeFileSync(`${folder}/dist/types/${name}.d.ts`,
-                text.replace(/(\bfrom |\bimport\()'\.\/([\w/]+)'/g, (_, keyword, module) => {
-                  copyTypes(module);
-                  return `${keyword}'./${module}.js'`;
+                text.replace(/(\bfrom |\bimport\()'(\.[\w./]+)'/g, (_, keyword, module) => {
+                  copyTypes(join(dirname(name), module));
+                  return `${keyword}'${module}.js'`;
                 }));
 }
-mkdirSync(`${folder}/dist/types`, {recursive: true});
-copyTypes('index');
+copyTypes('src/index');
+copyTypes('src/testing');
 
 await build({
   entryPoints: [`${folder}/src/index.ts`],
   outfile: `${folder}/dist/index.js`,
   bundle: true,
+  loader: {'.wasm': 'binary'},
   packages: 'external',
   format: 'esm',
   target: 'es2022',
   sourcemap: true,
 });
+
+// The tools for tests are in the same file as the client, with which they share the WebAssembly
+// module.
+const tools = [...readFileSync(`${folder}/src/testing.ts`, 'utf8')
+                   .matchAll(/^export function (\w+)/gm)].map((match) => match[1]);
+writeFileSync(`${folder}/dist/testing.js`,
+              `import {testing} from './index.js';\n\n` +
+              `export const {${tools.join(', ')}} = testing;\n`);

@@ -28,6 +28,7 @@ await build({
   entryPoints: files.map((file) => `${folder}/test/${file}`),
   outdir: out,
   bundle: true,
+  loader: {'.wasm': 'binary'},
   packages: 'external',
   platform: 'node',
   format: 'esm',

@@ -1,4 +1,5 @@
-import {Session, defaultOptions} from './session';
+import {Session} from './session';
+import {defaultOptions} from './session_options';
 import {Status} from './status';
 import type {
   ClientListeners, ClientOptions, ClientState, Statistics, WebSocketLike
@@ -7,6 +8,8 @@ import type {Role, World} from './types';
 
 /** Longest timer interval. Browsers delay timers of hidden pages, so long ones are not reliable. */
 const maxTimerMs = 500;
+/** While the socket has more unsent bytes than this, the session keeps its commands. */
+const maxBufferedBytes = 1 << 20;
 
 /**
  * A connection to a server.
@@ -37,6 +40,7 @@ export class Client {
 
   /**
    * Creates a client that is not connected yet.
+   * @throws Error WebAssembly or its SIMD instructions are missing
    * @throws RangeError an option is out of range
    * @throws SyntaxError `url` does not start with ws:// or wss://
    * @throws TypeError an option has the wrong type, there is no WebSocket class, or the machine is
@@ -92,8 +96,8 @@ export class Client {
    * arrives now with this smallest delay.
    */
   serverTimeS(): number | null {
-    const {clock} = this.session;
-    return clock.ready ? clock.serverTimeS(this.nowS()) : null;
+    const timeS = this.session.serverTimeS(this.nowS());
+    return Number.isNaN(timeS) ? null : timeS;
   }
 
   /**
@@ -149,7 +153,8 @@ export class Client {
       session.startConnecting(this.nowS());
       this.openSocket();
     }
-    if (this.socket !== null && this.socket.readyState === 1) {
+    if (this.socket !== null && this.socket.readyState === 1 &&
+        this.socket.bufferedAmount < maxBufferedBytes) {
       for (const frame of session.takeOutput()) this.socket.send(frame);
       // A closed WebSocket still sends what it has buffered.
       if (session.state === 'closing') {

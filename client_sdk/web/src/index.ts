@@ -5,3 +5,5 @@ export {Client} from './client';
 export {StridewireError} from './error';
 export {Status, statusName, statusText} from './status';
 export {createCrowdPose, createPose} from './pose_buffers';
+/** Contents of `@stridewire/client/testing`, which shares the WebAssembly module. @internal */
+export * as testing from './testing';

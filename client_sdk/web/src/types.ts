@@ -15,8 +15,10 @@ export type Role = 'controller' | 'observer';
  * - `full`: float32 values, exactly as the server computed them.
  * - `quantised`: about a quarter of the bytes; no joint or end site is off by more than 1 mm.
  *   Older servers send quantised poses of 40 % of the bytes of `full`.
+ * - `movement`: the client evaluates movements with the world's motion library, which it fetches
+ *   from the server first. The poses are exactly those of the server. They are not recorded.
  */
-export type PoseMode = 'full' | 'quantised';
+export type PoseMode = 'full' | 'quantised' | 'movement';
 /**
  * Which joints a quantised pose contains.
  * - `all`: all joints.

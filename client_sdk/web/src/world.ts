@@ -1,22 +1,23 @@
 import {Listeners} from './listeners';
-import {detailOf} from './pose_flags';
-import type {WorldRecording} from './recording';
-import type {Command, Session} from './session';
-import type {
-  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseDetail, PoseKind,
-  PoseMode, Recording, Reply, Role, Skeleton, SpawnItem, Subscription, Terrain, World,
-  WorldListeners, WorldState
+import {MemoryView, native} from './native';
+import {reserve} from './pose_buffers';
+import {WorldRecording} from './recording';
+import type {Session} from './session';
+import {
+  PoseFlag, type AvatarState, type CrowdPose, type LayerRequest, type MovementRequest,
+  type Observation, type Pose, type PoseKind, type Recording, type Reply, type Role, type Skeleton,
+  type SpawnItem, type Subscription, type Terrain, type World, type WorldListeners, type WorldState
 } from './types';
-import * as check from './wire/check';
-import {CompactCodec} from './wire/compact_codec';
-import type {BatchMode, Observe, SpawnItem as SpawnEntry, WorldInfo} from './wire/messages';
-import type {WorldView} from './world_view';
+import type {Observe, WorldInfo} from '../generated/messages';
+import * as commands from './wire/commands';
 
 /** A subscription that the client keeps up across lost sessions. */
 export interface ActiveSubscription {
-  readonly message: Observe;
-  /** True while `message` waits to be sent. */
-  unsent: boolean;
+  message: Observe;
+  /** Number in the module; 0 if the client is not connected. */
+  handle: number;
+  /** Receives the reply if it was not sent yet. */
+  answer: ((reply: Reply) => void) | null;
 }
 
 /** A world, with the state that the session keeps for it. Users see the interface `World` only. */
@@ -25,33 +26,41 @@ export class WorldHandle implements World {
   skeleton: Skeleton | null = null;
   libraryHash = '';
   layers: readonly string[] = [];
-  /** Decoders of compact poses, by mode. Empty if the server sends no compact poses. */
-  codecs: Partial<Record<BatchMode, CompactCodec>> = {};
   terrain: Terrain | null = null;
   readonly joined: Promise<Reply>;
+  readonly record: WorldRecording;
 
   // The fields below belong to the session.
   readonly listeners = new Listeners<WorldListeners>();
-  /** The world's number in messages; 0 until the server has sent it. */
-  serverId = 0;
+  /** The world's number in the WebAssembly module; 0 while the client is not connected. */
+  handle = 0;
   /** Resolves `joined`; null after the first reply. */
   answerJoin: ((reply: Reply) => void) | null = null;
-  /** Commands that have not been sent, in order. */
-  unsent: Command[] = [];
-  /** Subscriptions by number. */
   readonly subscriptions = new Map<number, ActiveSubscription>();
-  /** Avatars that this client has spawned, with their last known base frames. */
-  readonly spawned = new Map<number, SpawnEntry>();
-  /** Total from the last Lagging message. */
-  reportedDroppedBatches = 0;
+  /** Totals from the last report of the server. */
   reportedDroppedEvents = 0;
-  /** `view.version` and `terrain` of the last notification to listeners. */
-  notifiedVersion = 0;
-  notifiedTerrain: Terrain | null = null;
+  /** Revision of the avatars in the last notification to listeners. */
+  revision = 0;
+  private list = new Uint32Array(0);
+  private listRevision = 0;
+  private listHandle = 0;
+
+  private readonly ids = new MemoryView(Uint32Array);
+  private readonly flags = new MemoryView(Uint8Array);
+  private readonly roots = new MemoryView(Float32Array);
+  private readonly rotations = new MemoryView(Float32Array);
 
   constructor(private readonly session: Session, readonly name: string, readonly role: Role,
-              readonly view: WorldView, readonly record: WorldRecording) {
+              recordingS: number, maxRecordedEvents: number) {
     this.joined = new Promise((resolve) => this.answerJoin = resolve);
+    const world = this;
+    this.record = new WorldRecording({
+      get bytes() { return world.stateNumbers()?.[2] ?? 0; },
+      get firstTimeS() { return world.stateNumbers()?.[3] ?? NaN; },
+      get lastTimeS() { return world.stateNumbers()?.[4] ?? NaN; },
+      sampleAll: (timeS, out) => this.sampleCrowd(timeS, out, true),
+      clear: () => native().call.clear_recording(session.client, this.handle),
+    }, recordingS, maxRecordedEvents);
   }
 
   get recording(): Recording {
@@ -59,31 +68,32 @@ export class WorldHandle implements World {
   }
 
   spawn(items: readonly SpawnItem[]): Promise<Reply> {
-    return this.session.command(this, () => check.spawn(items));
+    return this.session.command(this, () => commands.spawn(items));
   }
 
   remove(avatars: readonly number[]): Promise<Reply> {
-    return this.session.command(this, () => check.remove(avatars));
+    return this.session.command(this, () => commands.remove(avatars));
   }
 
   cancel(avatars: readonly number[]): Promise<Reply> {
-    return this.session.command(this, () => check.cancelQueue(avatars));
+    return this.session.command(this, () => commands.cancelQueue(avatars));
   }
 
   request(items: readonly MovementRequest[]): Promise<Reply> {
-    return this.session.command(this, () => check.request(items, () => this.session.nextRequest()));
+    return this.session.command(
+        this, () => commands.request(items, () => this.session.nextRequest()));
   }
 
   setTerrain(terrain: Terrain | null): Promise<Reply> {
-    return this.session.command(this, () => check.setTerrain(terrain));
+    return this.session.command(this, () => commands.setTerrain(terrain));
   }
 
   setLayers(items: readonly LayerRequest[]): Promise<Reply> {
-    return this.session.command(this, () => check.setLayers(items));
+    return this.session.command(this, () => commands.setLayers(items));
   }
 
   setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply> {
-    return this.session.command(this, () => check.setPlanting(avatars, enabled));
+    return this.session.command(this, () => commands.setPlanting(avatars, enabled));
   }
 
   observe(observation: Observation): Subscription {
@@ -103,78 +113,79 @@ export class WorldHandle implements World {
   }
 
   avatars(): Uint32Array {
-    return this.view.avatars();
+    const revision = this.stateNumbers()?.[0] ?? 0;
+    if (revision !== this.listRevision || this.handle !== this.listHandle) {
+      this.listRevision = revision;
+      this.listHandle = this.handle;
+      const count = native().call.avatars(this.session.client, this.handle);
+      this.list = this.ids.get(native().results[0]!, count).slice();
+    }
+    return this.list;
   }
 
   sample(avatar: number, timeS: number, out: Pose): PoseKind {
     this.session.recordSample(this, timeS);
-    return this.view.sample(avatar, timeS, out);
+    const kind = native().call.sample(this.session.client, this.handle, avatar, timeS);
+    if (kind === 0) return 'missing';
+    const [joints, rootAt, rotationsAt, tick, flags, heldS] = native().results;
+    if (out.rotations.length < 4 * joints!) out.rotations = new Float32Array(4 * joints!);
+    out.rootM.set(this.roots.get(rootAt!, 3));
+    out.rotations.set(this.rotations.get(rotationsAt!, 4 * joints!));
+    out.jointCount = joints!;
+    out.tick = tick!;
+    out.standing = (flags! & PoseFlag.standing) !== 0;
+    out.detail = (flags! & PoseFlag.reducedJoints) !== 0 ? 'reduced'
+        : (flags! & PoseFlag.rootOnly) !== 0 ? 'root' : 'all';
+    out.heldS = heldS!;
+    return kind === 1 ? 'interpolated' : 'held';
   }
 
   sampleAll(timeS: number, out: CrowdPose): number {
     this.session.recordSample(this, timeS);
-    return this.view.sampleAll(timeS, out);
+    return this.sampleCrowd(timeS, out, false);
   }
 
-  /** Applies a WorldInfo message. A different skeleton clears all poses. */
+  /** Copies the poses to the caller's arrays, because the memory of the module moves when it
+   * grows. */
+  private sampleCrowd(timeS: number, out: CrowdPose, recorded: boolean): number {
+    const count =
+        native().call.sample_all(this.session.client, this.handle, timeS, Number(recorded));
+    const {results} = native();
+    const joints = results[0]!;
+    reserve(out, count, joints);
+    out.avatars.set(this.ids.get(results[1]!, count));
+    out.flags.set(this.flags.get(results[2]!, count));
+    out.rootsM.set(this.roots.get(results[3]!, 3 * count));
+    out.rotations.set(this.rotations.get(results[4]!, 4 * joints * count));
+    out.count = count;
+    out.jointCount = joints;
+    return count;
+  }
+
+  /** Returns numbers of the module about this world, or null if it does not know the world. */
+  stateNumbers(): Float64Array | null {
+    return native().call.world_state(this.session.client, this.handle) < 0 ? null
+                                                                           : native().results;
+  }
+
+  /** Applies a WorldInfo message. */
   setInfo(info: WorldInfo): void {
     const skeleton = toSkeleton(info);
     if (this.skeleton === null || !sameSkeleton(this.skeleton, skeleton)) {
-      this.view.reset(skeleton.jointCount);
-      this.record.clear();
+      this.record.clearEvents();
       this.skeleton = skeleton;
     }
     this.libraryHash = info.libraryHash;
     this.layers = info.layers;
-    const {rotationCodes: codes, reducedJoints} = info;
-    this.codecs = codes.length === 0 ? {} : {
-      compact: new CompactCodec(codes),
-      compactRoot: new CompactCodec(codes, [0]),
-      ...(reducedJoints.length > 0 ? {compactFewer: new CompactCodec(codes, reducedJoints)} : {}),
-    };
   }
 
   /** Discards everything that the server has sent about the world. Keeps the subscriptions. */
   reset(): void {
-    this.serverId = 0;
-    this.reportedDroppedBatches = 0;
     this.reportedDroppedEvents = 0;
-    this.view.reset(0);
-    this.view.startNewEpoch();
-    this.record.clear();
+    this.record.clearEvents();
     this.skeleton = null;
     this.libraryHash = '';
     this.layers = [];
-    this.codecs = {};
-    this.terrain = null;
-  }
-
-  /** Restricts stored poses to the avatars of the subscriptions. Call it when these change. */
-  updateFilter(): void {
-    const observed = new Set<number>();
-    for (const {message} of this.subscriptions.values()) {
-      if (message.avatars.length === 0) return this.view.setFilter(null);
-      for (const avatar of message.avatars) observed.add(avatar);
-    }
-    this.view.setFilter(observed.size === 0 ? null : observed);
-  }
-
-  /** Returns the smallest number of ticks per pose that subscriptions request for batches of this
-   * mode; 0 if none requests this mode. */
-  everyNTicks(batchMode: BatchMode): number {
-    const mode: PoseMode = batchMode === 'full' ? 'full' : 'quantised';
-    const detail = detailOf(batchMode);
-    let smallest = 0;
-    const add = (requested: PoseDetail | undefined, n: number): void => {
-      if (requested === detail) smallest = smallest === 0 ? n : Math.min(smallest, n);
-    };
-    for (const {message} of this.subscriptions.values()) {
-      if (message.mode !== mode) continue;
-      add(message.detail, message.everyNTicks);
-      message.region?.ringDetails.forEach(
-          (requested, i) => add(requested, message.region!.rings[i]!.everyNTicks));
-    }
-    return smallest;
   }
 }
 

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {Status} from '../src/status';
 import type {Reply, WorldEvent} from '../src/types';
-import {decodeFrame} from '../src/wire/decode';
+import {decodeMessage} from '../src/testing';
 import * as server from './support/server_frames';
 import {Harness, settled, statusOf, summary} from './support/session_harness';
 
@@ -237,7 +237,7 @@ test('times out if the server is silent, and pings before its idle timeout', () 
   assert.equal(h.session.state, 'waiting');
   h.connect({idleTimeoutS: 6});
   const pings = (): number => h.session.takeOutput()
-      .filter((frame) => decodeFrame(frame, 'client').type === 'Ping').length;
+      .filter((frame) => decodeMessage(frame, 'client').type === 'Ping').length;
   let count = pings();
   const startS = h.nowS;
   while (h.nowS < startS + 5.9) {

@@ -4,12 +4,10 @@ import {test} from 'node:test';
 import {Builder} from 'flatbuffers';
 import {tableNumbers, tables} from '../generated/tables';
 import * as wire from '../generated/wire';
-import {decodeFrame} from '../src/wire/decode';
 import type {MessageName} from '../generated/messages';
-import {makeFrame, type Sender} from '../src/wire/frame';
-import {Malformed} from '../src/wire/malformed';
-import {verify} from '../src/wire/verify';
+import {decodeMessage, type Sender} from '../src/testing';
 import {root} from './support/environment';
+import {makeFrame} from './support/frame';
 import {readVectors} from './support/vectors';
 
 /** Extracts from flatc's generated reader of a table the expressions that read each field. */
@@ -70,21 +68,21 @@ test('the layout of each table agrees with the generated readers', () => {
   }
 });
 
-test('accepts every vector and rejects truncated ones', () => {
-  for (const {name, frame, type} of readVectors()) {
-    const table = tableNumbers[type as MessageName];
-    assert.ok(verify(new DataView(frame, 16), table, 1 << 20), name);
+test('rejects truncated messages', () => {
+  for (const {name, frame} of readVectors()) {
     if (frame.byteLength > 4096) continue;
     // Each of these lengths cuts off more than padding.
-    for (const bytes of [0, 4, 8, (frame.byteLength - 16) >> 1]) {
-      assert.ok(!verify(new DataView(frame, 16, bytes), table, 1 << 20), `${name}, ${bytes}`);
+    for (const bytes of [8, ((frame.byteLength - 16) >> 4) << 3]) {
+      if (bytes >= frame.byteLength - 16) continue;
+      const cut = frame.slice(0, 16 + bytes);
+      new DataView(cut).setUint32(8, bytes, true);
+      assert.throws(() => decodeMessage(cut), Error, `${name}, ${bytes}`);
     }
   }
 });
 
 function assertRejected(frame: ArrayBuffer, sender: Sender, why: RegExp): void {
-  assert.throws(() => decodeFrame(frame, sender),
-                (error) => error instanceof Malformed && why.test(error.message), `${why}`);
+  assert.throws(() => decodeMessage(frame, sender), why);
 }
 
 function withHeader(change: (view: DataView) => void): ArrayBuffer {
@@ -103,8 +101,8 @@ test('checks headers in the order of the standard', () => {
     (view: DataView) => view.setUint32(8, 12, true), (view: DataView) => view.setUint32(8, 8, true),
   ];
   const why = [
-    /magic/, /version 2/, /type 999/, /this side/, /flags/, /longer than/, /multiple of 8/,
-    /length differs/
+    /magic/, /frame version.*2/, /message type.*999/, /this side/, /flags/, /exceeds the limit/,
+    /multiple of 8/, /differs from its header/
   ];
   why.forEach((sentence, i) => {
     // Later checks would fail as well, but the first failure is reported.
@@ -124,7 +122,7 @@ function message(name: MessageName, build: (b: Builder) => number): ArrayBuffer 
 
 test('rejects lists and texts that are too long before copying them', () => {
   assertRejected(message('Goodbye', (b) => wire.Goodbye.createGoodbye(
-      b, 0, b.createString('x'.repeat(1025)))), 'server', /from 0 to 1024, got 1025/);
+      b, 0, b.createString('x'.repeat(1025)))), 'server', /Goodbye.text.*1025/);
   // 65,537 references to one event make a small frame.
   assertRejected(message('Events', (b) => {
     wire.Event.startEvent(b);
@@ -132,13 +130,13 @@ test('rejects lists and texts that are too long before copying them', () => {
     const event = wire.Event.endEvent(b);
     const list = wire.Events.createEventsVector(b, new Array(65_537).fill(event));
     return wire.Events.createEvents(b, 1, 1n, 1n, list);
-  }), 'server', /from 1 to 65536, got 65537/);
+  }), 'server', /Events.events.*65537/);
   assertRejected(message('Reply', (b) => {
     wire.ReplyItem.startReplyItem(b);
     const item = wire.ReplyItem.endReplyItem(b);
     const list = wire.Reply.createItemsVector(b, new Array(70_000).fill(item));
     return wire.Reply.createReply(b, 1n, 0, b.createString(''), 0, list);
-  }), 'server', /well-formed/);
+  }), 'server', /FlatBuffers/);
 });
 
 test('accepts texts only as UTF-8 without control characters', () => {
@@ -153,6 +151,6 @@ test('accepts texts only as UTF-8 without control characters', () => {
   for (const bytes of [[10], [0x7f], [0xc2, 0x85], [0]]) {
     assertRejected(goodbye(bytes), 'server', /control/);
   }
-  const marked = decodeFrame(goodbye([0xef, 0xbb, 0xbf, 0x61]), 'server');
+  const marked = decodeMessage(goodbye([0xef, 0xbb, 0xbf, 0x61]), 'server');
   assert.ok(marked.type === 'Goodbye' && marked.text === '\ufeffa');
 });

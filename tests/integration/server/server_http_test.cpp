@@ -90,7 +90,8 @@ TEST_F(ServerHttp, ServesViewerFiles) {
   const std::string policy(page["Content-Security-Policy"]);
   EXPECT_THAT(policy, HasSubstr("default-src 'self'"));
   EXPECT_THAT(policy, HasSubstr("frame-ancestors 'none'"));
-  EXPECT_THAT(policy, testing::Not(HasSubstr("unsafe")));
+  EXPECT_THAT(policy, HasSubstr("script-src 'self' 'wasm-unsafe-eval'"));
+  EXPECT_THAT(policy, testing::Not(HasSubstr("'unsafe")));
   EXPECT_EQ(page["X-Content-Type-Options"], "nosniff");
   EXPECT_EQ(page["Referrer-Policy"], "no-referrer");
   EXPECT_EQ(client.Request("/index.html?x=1").body(), page.body());

@@ -97,13 +97,9 @@ test('shows walking avatars with the same poses as the C++ client', async () => 
     const lines = await dumpPoses(server, 'plaza', 1, 60, 'full');
     await waitFor('the page has received the last of them', () => page.evaluate(
       (timeS) => window.stridewire.worlds[0].world.recording.lastTimeS >= timeS, lines.at(-1)[1]));
-    // The received pose of each time, or null. Interpolated poses do not count.
+    // The recorded pose of each time, or null. It is interpolated if the server dropped the batch.
     const ours = await page.evaluate(([times, avatar]) => {
       const {world} = window.stridewire.worlds[0];
-      const received = new Set([...world.recording.streams.values()].flatMap(
-        ({ticks, first}) => ticks.slice(first))
-        .filter(({parts}) => parts.some(({avatars}) => avatars.includes(avatar)))
-        .map(({timeS}) => timeS));
       const out = {
         count: 0, jointCount: 0, avatars: new Uint32Array(0), flags: new Uint8Array(0),
         rootsM: new Float32Array(0), rotations: new Float32Array(0),
@@ -112,28 +108,26 @@ test('shows walking avatars with the same poses as the C++ client', async () => 
         const count = world.recording.sampleAll(timeS, out);
         const i = out.avatars.subarray(0, count).indexOf(avatar);
         const size = 4 * out.jointCount;
-        return i < 0 || !received.has(timeS) ? null : [
+        return i < 0 ? null : [
           ...out.rootsM.subarray(3 * i, 3 * i + 3),
           ...out.rotations.subarray(size * i, size * (i + 1))];
       });
     }, [lines.map((line) => line[1]), 1]);
-    return {lines, ours};
+    const theirs = lines.map(([, , ...numbers]) => numbers.map(Math.fround));
+    return {lines, ours, lost: ours.filter((pose, i) => String(pose) !== String(theirs[i])).length};
   };
   const dropped = () => page.evaluate(() => window.stridewire.stats.batchesDropped);
   // On a busy machine, the server may drop a batch, which it reports. Then the test compares
   // another 60 ticks.
-  let lines, ours;
+  let lines, ours, lost;
   for (let attempt = 1; ; ++attempt) {
     const droppedBefore = await dropped();
-    ({lines, ours} = await compare());
-    const lost = ours.filter((pose) => pose === null).length;
+    ({lines, ours, lost} = await compare());
     if (lost === 0) break;
     assert.ok(attempt < 20, `the page keeps losing ticks, ${lost} of the last 60`);
     await waitFor('the server reports the dropped batches',
       async () => await dropped() > droppedBefore);
   }
-  lines.forEach(([tick, , ...theirs], i) =>
-    assert.deepEqual(ours[i], theirs.map(Math.fround), `tick ${tick}`));
   await waitFor('the avatar has moved', async () => {
     const drawn = await rootOf(page, 1);
     return drawn !== null && drawn.timeS >= lines[0][1] && distanceM(ours[0], drawn.rootM) > 0.2;

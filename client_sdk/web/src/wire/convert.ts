@@ -1,6 +1,6 @@
 import type {AvatarState, Terrain, WorldEvent} from '../types';
-import type {AvatarState as AvatarStateMessage, Event, TerrainInfo} from './messages';
-import {parameterNames} from './rules';
+import type {AvatarState as AvatarStateMessage, Event, TerrainInfo} from '../../generated/messages';
+import {parameterNames} from './parameters';
 
 /** Conversions of messages to public types that differ from the schema. */
 

@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
-import type {BatchMode, Message} from '../../src/wire/messages';
-import {PoseReader} from '../../src/wire/pose_codec';
-import {vectorCodec} from './vectors';
+import {decodePoses, type Message} from '../../src/testing';
+import type {CrowdPose} from '../../src/types';
+import {vectorInfo} from './vectors';
 
 /** Values of all enumerators and message types. */
 const enumerators = new Set([
@@ -51,24 +51,23 @@ export function assertValid(value: unknown, field = ''): void {
 }
 
 /** Asserts that a message is valid. Poses of a batch must be finite with unit rotations, unless the
- * reader rejects them. */
-export function checkMessage(message: Message): 'valid' | 'invalid pose' {
+ * module rejects them. */
+export function checkMessage(message: Message, frame: ArrayBuffer): 'valid' | 'invalid pose' {
   assertValid(message);
   if (message.type !== 'PoseBatch') return 'valid';
-  const mode = message.mode as BatchMode;
-  const reader = new PoseReader({...message, mode, codec: vectorCodec(mode)});
-  const rootM = new Float32Array(3);
-  const rotations = new Float32Array(4 * message.jointCount);
-  for (let i = 0; i < message.avatars.length; ++i) {
-    rootM.fill(NaN);
-    rotations.fill(NaN);
-    if (!reader.read(i, rootM, 0, rotations, 0)) return 'invalid pose';
-    for (const x of rootM) assert.ok(Number.isFinite(x), `root ${x}`);
-    for (let j = 0; j < rotations.length; j += 4) {
-      const length = Math.hypot(rotations[j]!, rotations[j + 1]!, rotations[j + 2]!,
-                                rotations[j + 3]!);
-      assert.ok(Math.abs(length - 1) <= 1.001e-3, `a rotation has length ${length}`);
-    }
+  let poses: CrowdPose;
+  try {
+    poses = decodePoses(frame, vectorInfo());
+  } catch {
+    return 'invalid pose';
+  }
+  for (const x of poses.rootsM.subarray(0, 3 * poses.count)) {
+    assert.ok(Number.isFinite(x), `root ${x}`);
+  }
+  const rotations = poses.rotations.subarray(0, 4 * poses.jointCount * poses.count);
+  for (let j = 0; j < rotations.length; j += 4) {
+    const length = Math.hypot(...rotations.subarray(j, j + 4));
+    assert.ok(Math.abs(length - 1) <= 1.001e-3, `a rotation has length ${length}`);
   }
   return 'valid';
 }

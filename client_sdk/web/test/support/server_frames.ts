@@ -1,7 +1,7 @@
 import {Builder} from 'flatbuffers';
 import * as wire from '../../generated/wire';
 import {enums} from '../../generated/messages';
-import {makeFrame} from '../../src/wire/frame';
+import {makeFrame} from './frame';
 import type {WorldEventType} from '../../src/types';
 
 /** Functions that return the frames of a server. */

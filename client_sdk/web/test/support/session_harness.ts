@@ -1,9 +1,9 @@
 import assert from 'node:assert/strict';
-import {Session, defaultOptions, type SessionOptions} from '../../src/session';
+import {Session} from '../../src/session';
+import {defaultOptions, type SessionOptions} from '../../src/session_options';
 import {Status} from '../../src/status';
 import type {Reply} from '../../src/types';
-import {decodeFrame} from '../../src/wire/decode';
-import type {Message} from '../../src/wire/messages';
+import {decodeMessage, type Message} from '../../src/testing';
 import type {WorldHandle} from '../../src/world';
 import * as server from './server_frames';
 
@@ -37,7 +37,7 @@ export class Harness {
 
   /** Returns the messages that the client has sent since the last call, without pings. */
   sent(): Message[] {
-    return this.session.takeOutput().map((frame) => decodeFrame(frame, 'client'))
+    return this.session.takeOutput().map((frame) => decodeMessage(frame, 'client'))
         .filter((message) => message.type !== 'Ping');
   }
 

@@ -1,11 +1,11 @@
 import {enums} from '../../generated/messages';
 import type {
-  BatchMode, CurrentMovement, LegInfo as Leg, Message, RequestItem as QueuedRequest,
+  CurrentMovement, LegInfo as Leg, Message, RequestItem as QueuedRequest,
   TerrainInfo as Terrain
-} from '../../src/wire/messages';
-import {parameterList} from '../../src/wire/rules';
-import {PoseReader} from '../../src/wire/pose_codec';
-import {vectorCodec} from './vectors';
+} from '../../generated/messages';
+import {parameterList} from '../../src/wire/parameters';
+import {decodePoses} from '../../src/testing';
+import {vectorInfo} from './vectors';
 import type {Parameters, Vec3} from '../../src/types';
 
 type Json = unknown;
@@ -88,7 +88,7 @@ function movement(m: CurrentMovement): Json {
 }
 
 /** Converts a message to the JSON of protocol/vectors, which uses the names of the schema. */
-export function toJson(m: Message): {[name: string]: Json} {
+export function toJson(m: Message, frame: ArrayBuffer): {[name: string]: Json} {
   switch (m.type) {
     case 'Hello':
       return {
@@ -186,23 +186,20 @@ export function toJson(m: Message): {[name: string]: Json} {
         })),
       };
     case 'PoseBatch': {
-      const reader = new PoseReader(
-          {...m, mode: m.mode as BatchMode, codec: vectorCodec(m.mode as BatchMode)});
+      const decoded = decodePoses(frame, vectorInfo());
       return {
         world: m.world, shard: m.shard, part: m.part, parts: m.parts, tick: u64(m.tick),
         server_time_s: m.serverTimeS, mode: enums.PoseMode.indexOf(m.mode),
         joint_count: m.jointCount,
         ...(m.partial ? {partial: true} : {}),
-        poses: [...m.avatars].map((avatar, i) => {
-          const rootM = new Float32Array(3);
-          const rotations = new Float32Array(4 * m.jointCount);
-          if (!reader.read(i, rootM, 0, rotations, 0)) throw new Error(`pose ${i} is invalid`);
-          return {
-            avatar, flags: m.flags[i], root_position_m: [...rootM],
-            rotations: Array.from({length: m.jointCount}, (_, j) =>
-                [...rotations.subarray(4 * j, 4 * j + 4)]),
-          };
-        }),
+        poses: [...m.avatars].map((avatar, i) => ({
+          avatar, flags: m.flags[i],
+          root_position_m: [...decoded.rootsM.subarray(3 * i, 3 * i + 3)],
+          rotations: Array.from({length: m.jointCount}, (_, j) => {
+            const at = 4 * (i * m.jointCount + j);
+            return [...decoded.rotations.subarray(at, at + 4)];
+          }),
+        })),
       };
     }
     case 'Events':

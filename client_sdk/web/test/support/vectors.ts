@@ -1,7 +1,4 @@
 import {readFileSync, readdirSync} from 'node:fs';
-import {CompactCodec} from '../../src/wire/compact_codec';
-import type {BatchMode} from '../../src/wire/messages';
-import {decodeFrame} from '../../src/wire/decode';
 import {root} from './environment';
 
 export interface Vector {
@@ -28,19 +25,10 @@ export function readVectors(): Vector[] {
   });
 }
 
-const codecs = new Map<BatchMode, CompactCodec>();
+let info: ArrayBuffer | null = null;
 
-/** Returns the codec of the compact poses in the vectors, built from `world_info_detail`. Returns
- * null for other modes. */
-export function vectorCodec(mode: BatchMode): CompactCodec | null {
-  if (mode === 'full' || mode === 'quantised') return null;
-  const known = codecs.get(mode);
-  if (known !== undefined) return known;
-  const vector = readVectors().find(({name}) => name === 'world_info_detail')!;
-  const info = decodeFrame(vector.frame, 'server');
-  if (info.type !== 'WorldInfo') throw new Error('world_info_detail is not a WorldInfo');
-  const codec = new CompactCodec(info.rotationCodes,
-    mode === 'compactFewer' ? info.reducedJoints : mode === 'compactRoot' ? [0] : []);
-  codecs.set(mode, codec);
-  return codec;
+/** Returns the WorldInfo frame of the compact poses in the vectors. */
+export function vectorInfo(): ArrayBuffer {
+  info ??= readVectors().find(({name}) => name === 'world_info_detail')!.frame;
+  return info;
 }

@@ -1,0 +1,181 @@
+import moduleBytes from '../build/client.wasm';
+
+/** Functions of the WebAssembly module. wasm/client_module.cpp describes them. */
+interface Exports {
+  readonly memory: WebAssembly.Memory;
+  _initialize(): void;
+  results(): number;
+  input(bytes: number): number;
+  check_frame(bytes: number, fromClient: number): number;
+  encode_frame(bytes: number, fromClient: number): number;
+  decode_poses(infoBytes: number, bytes: number): number;
+  describe_status(status: number, name: number): void;
+  create(nameBytes: number, tokenBytes: number): number;
+  destroy(client: number): void;
+  open(client: number, nowS: number): void;
+  close(client: number, nowS: number): void;
+  state(client: number, nowS: number): number;
+  start_connecting(client: number, nowS: number): void;
+  on_connected(client: number, nowS: number): void;
+  on_frame(client: number, bytes: number, nowS: number): void;
+  on_lost(client: number, status: number, bytes: number, nowS: number): void;
+  advance(client: number, nowS: number): void;
+  take_output(client: number): number;
+  on_output_written(client: number): void;
+  next_event(client: number): number;
+  last_error(client: number): void;
+  command(client: number, world: number, bytes: number): number;
+  statistics(client: number): void;
+  server_time(client: number, nowS: number): number;
+  find_world(client: number, id: number): number;
+  world_state(client: number, world: number): number;
+  clear_recording(client: number, world: number): void;
+  avatars(client: number, world: number): number;
+  sample(client: number, world: number, avatar: number, timeS: number): number;
+  sample_all(client: number, world: number, timeS: number, recorded: number): number;
+}
+
+const textAt = 14;
+const textBytes = 15;
+const decoder = new TextDecoder();
+const encoder = new TextEncoder();
+
+/** A module that uses one SIMD instruction. */
+const simdModule = Uint8Array.of(
+    0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253,
+    15, 253, 98, 11);
+
+/** The client's session and codecs, compiled to WebAssembly. All clients share one instance. */
+class Native {
+  readonly call: Exports;
+  /** What the module has written to stderr. */
+  private log = '';
+  private readonly resultsAt: number;
+  private buffer = new ArrayBuffer(0);
+  private resultList = new Float64Array(0);
+  private memory = new Uint8Array(0);
+
+  constructor(module: WebAssembly.Module) {
+    // The module only prints broken invariants, before it stops.
+    const instance = new WebAssembly.Instance(module, {wasi_snapshot_preview1: {
+      fd_write: (_fd: number, list: number, count: number, writtenAt: number): number => {
+        const view = new DataView(this.call.memory.buffer);
+        let written = 0;
+        for (let i = 0; i < count; ++i) {
+          const at = view.getUint32(list + 8 * i, true);
+          const bytes = view.getUint32(list + 8 * i + 4, true);
+          this.log += decoder.decode(new Uint8Array(view.buffer, at, bytes).slice());
+          written += bytes;
+        }
+        view.setUint32(writtenAt, written, true);
+        return 0;
+      },
+      fd_close: () => 0,
+      fd_seek: () => 70,  // Not seekable.
+    }});
+    this.call = instance.exports as unknown as Exports;
+    this.call._initialize();
+    this.resultsAt = this.call.results();
+  }
+
+  /** Numbers that the last call has returned. */
+  get results(): Float64Array {
+    this.refresh();
+    return this.resultList;
+  }
+
+  /** Text that the last call has returned. */
+  get text(): string {
+    const {results} = this;
+    // A copy, because browsers do not decode memory that can grow.
+    const at = results[textAt]!;
+    return decoder.decode(this.memory.slice(at, at + results[textBytes]!));
+  }
+
+  /** Copies bytes of the module. */
+  bytes(at: number, count: number): Uint8Array<ArrayBuffer> {
+    this.refresh();
+    return this.memory.slice(at, at + count);
+  }
+
+  /** Memory of the module. It becomes invalid when the module allocates memory. */
+  get memoryBuffer(): ArrayBuffer {
+    return this.call.memory.buffer;
+  }
+
+  /** Copies bytes to the memory for arguments. */
+  setInput(bytes: Uint8Array): void {
+    const at = this.call.input(bytes.length);
+    this.refresh();
+    this.memory.set(bytes, at);
+  }
+
+  setInputText(text: string): number {
+    const bytes = encoder.encode(text);
+    this.setInput(bytes);
+    return bytes.length;
+  }
+
+  /** Adds what the module has printed to an error of the module. */
+  explain(error: unknown): unknown {
+    if (!(error instanceof WebAssembly.RuntimeError)) return error;
+    const explained = new Error(`Stridewire's WebAssembly module has stopped: ${
+        this.log.trim() || error.message}`, {cause: error});
+    return explained;
+  }
+
+  private refresh(): void {
+    const {buffer} = this.call.memory;
+    if (buffer === this.buffer) return;
+    this.buffer = buffer;
+    this.memory = new Uint8Array(buffer);
+    this.resultList = new Float64Array(buffer, this.resultsAt, 32);
+  }
+}
+
+let loaded: Native | null = null;
+let failure = '';
+if (typeof WebAssembly === 'undefined') {
+  failure = 'this environment has no WebAssembly, which @stridewire/client needs';
+} else if (!WebAssembly.validate(simdModule)) {
+  failure = 'this environment has no WebAssembly SIMD, which @stridewire/client needs: use ' +
+      'Chrome 91, Firefox 89, Safari 16.4, Node.js 18 or newer';
+} else {
+  try {
+    // Browsers compile large modules on their main thread only asynchronously.
+    loaded = new Native(await WebAssembly.compile(moduleBytes));
+  } catch (error) {
+    failure = `@stridewire/client cannot compile its WebAssembly module: ${String(error)}`;
+  }
+}
+
+/**
+ * Returns the module.
+ * @throws Error WebAssembly or its SIMD instructions are missing
+ */
+export function native(): Native {
+  if (loaded === null) throw new Error(failure);
+  return loaded;
+}
+
+/** Converts names of fields in a text of the module to those of the web client. */
+export function webNames(text: string): string {
+  return text.replace(/_([a-z])/g, (_, letter: string) => letter.toUpperCase());
+}
+
+/** Views of the module's memory. A view is created again only if its place has changed. */
+export class MemoryView<T extends Float32Array | Uint32Array | Uint8Array> {
+  private view: T;
+
+  constructor(private readonly type: new (buffer: ArrayBuffer, at: number, length: number) => T) {
+    this.view = new type(new ArrayBuffer(0), 0, 0);
+  }
+
+  get(at: number, length: number): T {
+    const buffer = native().memoryBuffer;
+    if (this.view.buffer !== buffer || this.view.byteOffset !== at || this.view.length !== length) {
+      this.view = new this.type(buffer, at, length);
+    }
+    return this.view;
+  }
+}

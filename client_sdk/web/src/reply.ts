@@ -1,0 +1,24 @@
+import {StridewireError} from './error';
+import {Status, statusName, statusText} from './status';
+import type {Reply} from './types';
+import type {Reply as ReplyMessage} from '../generated/messages';
+
+/** Makes a reply from a status, and from the message of the server if there is one. */
+export function makeReply(code: number, text: string, message?: ReplyMessage): Reply {
+  return {
+    ok: code === 0,
+    code,
+    status: statusName(code),
+    text: text || statusText(code),
+    accepted: message?.accepted ?? 0,
+    items: (message?.items ?? []).map((item) => ({
+      ...item, status: statusName(item.code), text: item.text || statusText(item.code)
+    })),
+  };
+}
+
+/** Makes the reply to a command that was not sent, because of this error. */
+export function refusal(error: unknown): Reply {
+  if (error instanceof StridewireError) return makeReply(error.code, error.message);
+  return makeReply(Status.invalid_argument, error instanceof Error ? error.message : '');
+}

@@ -1,0 +1,73 @@
+/** Tools for programs that test implementations of the protocol. */
+import {MessageType, type Message} from '../generated/messages';
+import {native} from './native';
+import {createCrowdPose, reserve} from './pose_buffers';
+import type {CrowdPose} from './types';
+import {readMessage, typeOfFrame} from './wire/read';
+import {writeMessage} from './wire/write';
+
+export type {Message} from '../generated/messages';
+
+/** Side that sends a message. */
+export type Sender = 'client' | 'server';
+
+function senderOf(type: number): Sender {
+  return type < MessageType.Goodbye ? 'client' : 'server';
+}
+
+function check(frame: Uint8Array, sender: Sender): void {
+  native().setInput(frame);
+  if (native().call.check_frame(frame.length, Number(sender === 'client')) === 0) {
+    throw new Error(native().text);
+  }
+}
+
+/**
+ * Decodes a frame. Lists of numbers are views of the frame. The poses of a batch stay encoded, see
+ * `decodePoses`.
+ * @param sender the side that sent the frame; absent: the side that may send its message
+ * @throws Error the frame does not follow protocol/STANDARD.md
+ */
+export function decodeMessage(frame: ArrayBuffer, sender = senderOf(typeOfFrame(frame))): Message {
+  check(new Uint8Array(frame), sender);
+  return readMessage(frame);
+}
+
+/**
+ * Encodes a message as a frame, with the same bytes as the native libraries.
+ * @throws Error the message does not follow protocol/STANDARD.md
+ */
+export function encodeMessage(message: Message): ArrayBuffer {
+  const frame = writeMessage(message);
+  native().setInput(frame);
+  const isClient = senderOf(MessageType[message.type]) === 'client';
+  const bytes = native().call.encode_frame(frame.length, Number(isClient));
+  if (bytes === 0) throw new Error(native().text);
+  return native().bytes(native().results[0]!, bytes).buffer;
+}
+
+/**
+ * Decodes the poses of a batch, in its order. `flags` are those of the batch.
+ * @param info the WorldInfo frame of the batch's world, for compact poses
+ * @throws Error the batch or one of its poses is invalid
+ */
+export function decodePoses(batch: ArrayBuffer, info = new ArrayBuffer(0)): CrowdPose {
+  const input = new Uint8Array(info.byteLength + batch.byteLength);
+  input.set(new Uint8Array(info));
+  input.set(new Uint8Array(batch), info.byteLength);
+  native().setInput(input);
+  const count = native().call.decode_poses(info.byteLength, batch.byteLength);
+  if (count < 0) throw new Error(native().text);
+  const [joints, idsAt, flagsAt, rootsAt, rotationsAt] =
+      [...native().results.subarray(0, 5)] as [number, number, number, number, number];
+  const out = createCrowdPose();
+  reserve(out, count, joints);
+  out.count = count;
+  out.jointCount = joints;
+  const {memoryBuffer: memory} = native();
+  out.avatars.set(new Uint32Array(memory, idsAt, count));
+  out.flags.set(new Uint8Array(memory, flagsAt, count));
+  out.rootsM.set(new Float32Array(memory, rootsAt, 3 * count));
+  out.rotations.set(new Float32Array(memory, rotationsAt, 4 * joints * count));
+  return out;
+}

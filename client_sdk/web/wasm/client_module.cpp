@@ -1,0 +1,503 @@
+// The functions that the web client calls in its WebAssembly module. src/module.ts declares them.
+//
+// Messages cross the border as frames (protocol/STANDARD.md), in both directions: the web client
+// writes a command as a frame to the memory of `input`, and reads received messages from their
+// frames, which are verified and checked here first. Numbers that a function returns besides its
+// result are in `results`, whose entries are described at each function. Texts are at
+// `text_at` .. `text_at + results[kTextBytes]`.
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "session.h"
+#include "stridewire/protocol/check.h"
+#include "stridewire/protocol/decode.h"
+#include "stridewire/protocol/pose_batch_reader.h"
+
+// NOLINTNEXTLINE(cppcoreguidelines-macro-usage): an attribute with an argument.
+#define STRIDEWIRE_EXPORT(name) extern "C" __attribute__((export_name(#name), used))
+
+namespace stridewire::client {
+namespace {
+
+namespace protocol = stridewire::protocol;
+
+// The web client reads positions and rotations as arrays of floats.
+static_assert(sizeof(Vec3) == 12 && sizeof(Quat) == 16);
+static_assert(std::is_standard_layout_v<Quat> && offsetof(Quat, x) == 0 && offsetof(Quat, w) == 12);
+
+/// A session, and the results of its last calls.
+struct Client {
+  explicit Client(const SessionOptions& options) : session(options) {}
+  Session session;
+  std::vector<std::byte> output;
+  CrowdPose crowd;
+  std::vector<Quat> rotations;
+  Vec3 root_position_m = Vec3(0.0f);
+  std::vector<protocol::AvatarId> avatars;
+  std::uint64_t held = 0;  ///< Poses that were sampled after the newest pose of their avatar.
+};
+
+constexpr std::size_t kTextAt = 14;
+constexpr std::size_t kTextBytes = 15;
+std::array<double, 32> results;
+std::string text;
+// Memory for arguments. Its unit is 8 bytes, because frames must be aligned.
+std::vector<std::uint64_t> input_words;
+
+void SetText(std::string_view value) {
+  text = value;
+  results[kTextAt] = static_cast<double>(reinterpret_cast<std::uintptr_t>(text.data()));
+  results[kTextBytes] = static_cast<double>(text.size());
+}
+
+template <typename T>
+double Address(const std::vector<T>& list) {
+  return static_cast<double>(reinterpret_cast<std::uintptr_t>(list.data()));
+}
+
+std::span<const std::byte> Input(std::size_t bytes) {
+  return std::as_bytes(std::span(input_words)).first(bytes);
+}
+
+/// Decodes the frame in `input`. On error, sets the text.
+std::optional<protocol::Message> DecodeInput(std::size_t bytes, protocol::Sender sender) {
+  const auto frame = protocol::ParseFrame(Input(bytes), sender);
+  if (!frame) {
+    SetText(Describe(frame.error()));
+    return std::nullopt;
+  }
+  auto message = protocol::DecodeMessage(*frame);
+  if (!message) {
+    SetText(Describe(message.error()));
+    return std::nullopt;
+  }
+  return *std::move(message);
+}
+
+/// Checks received libraries, which natively is the work of the network thread.
+void RunLibraryTasks(Session& session) {
+  while (const auto task = session.TakeLibraryTask()) {
+    if (task->file.empty()) {
+      session.OnLibraryTask(task->hash, Fail(ErrorCode::kNotFound, "there is no cache"));
+      continue;
+    }
+    auto library = MotionLibrary::FromBytes(task->file);
+    if (library && (*library)->hash() != task->hash) {
+      library = Fail(ErrorCode::kMalformed, "the library has another hash than requested");
+    }
+    session.OnLibraryTask(task->hash, std::move(library));
+  }
+}
+
+/// Stores the number of a command, and its text if it was refused.
+std::uint32_t Report(Session& session, stridewire_status status, std::uint64_t command) {
+  results[0] = static_cast<double>(command);
+  if (status != STRIDEWIRE_OK) SetText(session.last_text());
+  RunLibraryTasks(session);
+  return status;
+}
+
+/// Sends a message as a command. Each overload is one command of SessionCommands.
+struct Submit {
+  Session& session;
+  stridewire_world world;
+  std::uint64_t& command;
+
+  stridewire_status operator()(protocol::JoinWorld& m) const {
+    stridewire_world joined = 0;
+    const stridewire_status status = session.JoinWorld(m.name, m.role, joined, command);
+    results[1] = joined;
+    return status;
+  }
+  stridewire_status operator()(protocol::LeaveWorld&) const {
+    return session.LeaveWorld(world, command);
+  }
+  stridewire_status operator()(protocol::Spawn& m) const {
+    return session.Spawn(world, std::move(m), command);
+  }
+  stridewire_status operator()(protocol::Remove& m) const {
+    return session.Remove(world, std::move(m), command);
+  }
+  stridewire_status operator()(protocol::Request& m) const {
+    return session.Request(world, std::move(m), command);
+  }
+  stridewire_status operator()(protocol::CancelQueue& m) const {
+    return session.Cancel(world, std::move(m), command);
+  }
+  stridewire_status operator()(protocol::SetTerrain& m) const {
+    return session.SetTerrain(world, std::move(m), command);
+  }
+  stridewire_status operator()(protocol::SetLayers& m) const {
+    return session.SetLayers(world, std::move(m), command);
+  }
+  stridewire_status operator()(protocol::SetPlanting& m) const {
+    return session.SetPlanting(world, std::move(m), command);
+  }
+  stridewire_status operator()(protocol::Observe& m) const {
+    if (m.replace && m.region) {
+      return session.MoveRegion(m.subscription, *std::move(m.region), command);
+    }
+    std::uint32_t subscription = 0;
+    const stridewire_status status = session.Observe(world, std::move(m), subscription, command);
+    results[1] = subscription;
+    return status;
+  }
+  stridewire_status operator()(protocol::StopObserving& m) const {
+    return session.StopObserving(m.subscription, command);
+  }
+  stridewire_status operator()(protocol::InspectAvatar& m) const {
+    return session.Inspect(world, m.avatar, command);
+  }
+  template <typename Message>
+  stridewire_status operator()(const Message&) const {
+    return STRIDEWIRE_UNSUPPORTED;
+  }
+};
+
+void SetCrowdResults(const CrowdPose& crowd) {
+  results[0] = static_cast<double>(crowd.joint_count);
+  results[1] = Address(crowd.avatars);
+  results[2] = Address(crowd.flags);
+  results[3] = Address(crowd.roots_m);
+  results[4] = Address(crowd.rotations);
+}
+
+}  // namespace
+
+/// Returns the address of `results`, an array of 32 doubles.
+STRIDEWIRE_EXPORT(results) double* Results() { return results.data(); }
+
+/// Returns memory for arguments of the next call. It is aligned to 8 bytes.
+STRIDEWIRE_EXPORT(input) std::uint64_t* InputMemory(std::size_t bytes) {
+  const std::size_t words = (bytes + 7) / 8;
+  if (input_words.size() < words) input_words.resize(words);
+  return input_words.data();
+}
+
+/// Checks the frame in `input`. Returns 1 if it is valid. Otherwise sets the text.
+STRIDEWIRE_EXPORT(check_frame) bool CheckFrame(std::size_t bytes, bool from_client) {
+  return DecodeInput(bytes, from_client ? protocol::Sender::kClient : protocol::Sender::kServer)
+      .has_value();
+}
+
+/// Encodes the message in the frame in `input` again, as the native libraries do, and returns the
+/// size of the frame. Returns 0 and sets the text if it is invalid. results: 0 the address.
+STRIDEWIRE_EXPORT(encode_frame) std::size_t EncodeFrame(std::size_t bytes, bool from_client) {
+  static std::vector<std::byte> frame;
+  frame.clear();
+  const auto message =
+      DecodeInput(bytes, from_client ? protocol::Sender::kClient : protocol::Sender::kServer);
+  if (!message) return 0;
+  if (const Status status = protocol::Encoder().Encode(*message, frame); !status) {
+    SetText(Describe(status.error()));
+    return 0;
+  }
+  results[0] = Address(frame);
+  return frame.size();
+}
+
+/// Decodes the poses of a batch. `input` contains the frame of the WorldInfo of its world, and then
+/// the frame of the batch. Only compact poses need the former, which may have no bytes. Returns the
+/// number of poses, or -1 and sets the text if something is invalid. results: as in sample_all.
+STRIDEWIRE_EXPORT(decode_poses)
+std::int32_t DecodePoses(std::size_t info_bytes, std::size_t bytes) {
+  static CrowdPose crowd;
+  std::shared_ptr<const protocol::CompactCodecs> codecs;
+  if (info_bytes > 0) {
+    auto message = DecodeInput(info_bytes, protocol::Sender::kServer);
+    const auto* info = message ? std::get_if<protocol::WorldInfo>(&*message) : nullptr;
+    if (info == nullptr) return -1;
+    codecs = WorldView::MakeCodecs(*info);
+  }
+  const auto frame = protocol::ParseFrame(Input(info_bytes + bytes).subspan(info_bytes),
+                                          protocol::Sender::kServer);
+  auto message = frame ? protocol::DecodeMessage(*frame)
+                       : Expected<protocol::Message>(std::unexpected(frame.error()));
+  if (!message) {
+    SetText(Describe(message.error()));
+    return -1;
+  }
+  const auto* batch = std::get_if<protocol::PoseBatch>(&*message);
+  if (batch == nullptr) return -1;
+  const std::size_t joints = batch->info.joint_count;
+  crowd.Resize(batch->avatars.size(), joints);
+  protocol::PoseBatchReader reader(*batch, codecs ? codecs->Find(batch->info.mode) : nullptr);
+  for (std::size_t i = 0; i < crowd.avatars.size(); ++i) {
+    crowd.avatars[i] = batch->avatars[i];
+    crowd.flags[i] = batch->flags[i];
+    reader.Next();
+    const auto rotations = std::span(crowd.rotations).subspan(i * joints, joints);
+    if (const Status status = reader.Decode(crowd.roots_m[i], rotations); !status) {
+      SetText(Describe(status.error()));
+      return -1;
+    }
+  }
+  SetCrowdResults(crowd);
+  return static_cast<std::int32_t>(crowd.avatars.size());
+}
+
+/// Sets the text to the description of a status, or with `name` to its name.
+STRIDEWIRE_EXPORT(describe_status) void DescribeStatus(stridewire_status status, bool name) {
+  SetText(name ? stridewire_status_name(status) : stridewire_status_text(status));
+}
+
+// ---- a client
+
+/// Creates a client. `input` contains 10 numbers, in the order in which they are read here, and
+/// then the client's name and token. Returns null and sets the text if one of the texts is invalid.
+STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t token_bytes) {
+  std::array<double, 10> numbers;
+  const auto input = Input(sizeof numbers + name_bytes + token_bytes);
+  std::memcpy(numbers.data(), input.data(), sizeof numbers);
+  const auto* texts = reinterpret_cast<const char*>(input.data() + sizeof numbers);
+  protocol::Hello hello;
+  hello.client_name.assign(texts, name_bytes);
+  hello.auth_token.assign(texts + name_bytes, token_bytes);
+  if (const Status status = protocol::Check(hello); !status) {
+    SetText(Describe(status.error()));
+    return nullptr;
+  }
+  SessionOptions options;
+  options.client_name = hello.client_name;
+  options.auth_token = hello.auth_token;
+  options.max_commands = static_cast<std::size_t>(numbers[0]);
+  options.pose_history = static_cast<std::size_t>(numbers[1]);
+  // An address has 32 bits here.
+  constexpr double kMaxBytes = 4294967295.0;
+  options.max_pose_bytes = static_cast<std::size_t>(std::min(numbers[2], kMaxBytes));
+  options.recording_s = numbers[3];
+  options.max_recording_bytes = static_cast<std::size_t>(std::min(numbers[4], kMaxBytes));
+  options.connect_timeout_s = numbers[5];
+  options.ping_interval_s = numbers[6];
+  options.respawn = numbers[7] != 0.0;
+  options.seed = static_cast<std::uint64_t>(numbers[8]);
+  options.render_delay_s = numbers[9];
+  options.detailed_events = false;
+  return new Client(options);
+}
+
+STRIDEWIRE_EXPORT(destroy) void Destroy(Client* client) { delete client; }
+
+STRIDEWIRE_EXPORT(open) void Open(Client* client, double now_s) {
+  (void)client->session.Open(now_s);
+}
+STRIDEWIRE_EXPORT(close) void Close(Client* client, double now_s) { client->session.Close(now_s); }
+
+/// Returns the state, a Session::State. results: 0 the next time at which to call advance,
+/// 1 whether to start an attempt to connect, 2 whether the state needs a socket, 3 the number of
+/// the connection, 4 the number of bytes that wait to be sent.
+STRIDEWIRE_EXPORT(state) std::uint32_t State(Client* client, double now_s) {
+  const Session& session = client->session;
+  results[0] = session.NextTime();
+  results[1] = session.ConnectDue(now_s);
+  results[2] = session.NeedsSocket();
+  results[3] = static_cast<double>(session.connection_number());
+  results[4] = static_cast<double>(session.output_bytes());
+  return static_cast<std::uint32_t>(session.state());
+}
+
+STRIDEWIRE_EXPORT(start_connecting) void StartConnecting(Client* client, double now_s) {
+  client->session.StartConnecting(now_s);
+}
+STRIDEWIRE_EXPORT(on_connected) void OnConnected(Client* client, double now_s) {
+  client->session.OnConnected(now_s);
+}
+/// Handles the frame in `input`.
+STRIDEWIRE_EXPORT(on_frame) void OnFrame(Client* client, std::size_t bytes, double now_s) {
+  client->session.OnFrame(Input(bytes), now_s);
+  RunLibraryTasks(client->session);
+}
+/// `input` contains a text of `bytes` bytes, which may be 0.
+STRIDEWIRE_EXPORT(on_lost)
+void OnLost(Client* client, stridewire_status status, std::size_t bytes, double now_s) {
+  const auto input = Input(bytes);
+  client->session.OnLost(status, {reinterpret_cast<const char*>(input.data()), bytes}, now_s);
+}
+STRIDEWIRE_EXPORT(advance) void Advance(Client* client, double now_s) {
+  client->session.AdvanceTime(now_s);
+}
+/// Moves pending frames to the output and returns their size. results: 0 their address.
+STRIDEWIRE_EXPORT(take_output) std::size_t TakeOutput(Client* client) {
+  if (!client->session.TakeOutput(client->output)) return 0;
+  results[0] = Address(client->output);
+  return client->output.size();
+}
+STRIDEWIRE_EXPORT(on_output_written) void OnOutputWritten(Client* client) {
+  client->session.OnOutputWritten();
+}
+
+/// Removes the oldest event from the queue and returns its type; -1 if there is none. Sets the
+/// text. results: 0 world, 1 status, 2 command, 3 accepted, 4 resumed, 5 dropped batches, 6 dropped
+/// events.
+STRIDEWIRE_EXPORT(next_event) std::int32_t NextEvent(Client* client) {
+  stridewire_event event;
+  if (client->session.events().Take(std::span(&event, 1)) == 0) return -1;
+  results[0] = event.world;
+  results[1] = event.status;
+  results[2] = static_cast<double>(event.command);
+  results[3] = event.accepted;
+  results[4] = event.resumed;
+  results[5] = static_cast<double>(event.dropped_batches);
+  results[6] = static_cast<double>(event.dropped_events);
+  SetText(event.text);
+  return event.type;
+}
+
+/// Sets the text to the reason of the last failure.
+STRIDEWIRE_EXPORT(last_error) void LastError(Client* client) {
+  SetText(client->session.last_text());
+}
+
+/// Sends the message in `input` as a command for a world, and returns a status. JoinWorld ignores
+/// `world`. Sets the text if the status is not OK. results: 0 the number of the command, or the
+/// nonce of an InspectAvatar; 1 the number of a new world or subscription.
+STRIDEWIRE_EXPORT(command)
+std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes) {
+  auto message = DecodeInput(bytes, protocol::Sender::kClient);
+  if (!message) return STRIDEWIRE_INVALID_ARGUMENT;
+  std::uint64_t command = 0;
+  const stridewire_status status = std::visit(Submit{client->session, world, command}, *message);
+  return Report(client->session, status, command);
+}
+
+/// results: 0 mean and 1 worst jitter, 2 held poses, 3 ticks per second, and from 16 on the numbers
+/// in the order in which they are written here.
+STRIDEWIRE_EXPORT(statistics) void Statistics(Client* client) {
+  const stridewire_statistics s = client->session.Statistics();
+  const double numbers[] = {
+      static_cast<double>(s.bytes_sent),       static_cast<double>(s.batches_received),
+      static_cast<double>(s.poses_received),   static_cast<double>(s.poses_refused),
+      static_cast<double>(s.batches_missing),  static_cast<double>(s.dropped_batches),
+      static_cast<double>(s.commands_sent),    static_cast<double>(s.commands_resent),
+      static_cast<double>(s.commands_waiting), static_cast<double>(s.connects),
+      static_cast<double>(s.resumes),          static_cast<double>(s.connect_failures),
+      static_cast<double>(s.buffered_bytes),   s.rtt_s};
+  std::memcpy(results.data() + 16, numbers, sizeof numbers);
+  results[0] = client->session.jitter_s();
+  results[1] = client->session.worst_jitter_s();
+  results[2] = static_cast<double>(client->held);
+  results[3] = client->session.tick_hz();
+}
+
+/// Returns the server time at `now_s`; NaN if it is not known yet.
+STRIDEWIRE_EXPORT(server_time) double ServerTime(Client* client, double now_s) {
+  const ClockMap& clock = client->session.clock();
+  return clock.ready() ? clock.ServerTime(now_s) : std::numeric_limits<double>::quiet_NaN();
+}
+
+// ---- worlds
+
+/// Returns the world with a number of the server, or 0.
+STRIDEWIRE_EXPORT(find_world) stridewire_world FindWorld(Client* client, std::uint32_t id) {
+  return client->session.FindHandle(id);
+}
+
+/// Returns the state of a world, a Session::WorldState; -1 if there is no such world. results:
+/// 0 the revision of its avatars, 1 the time of its newest pose, 2 the bytes of its recording,
+/// 3 and 4 the first and the last time of the recording.
+STRIDEWIRE_EXPORT(world_state) std::int32_t WorldState(Client* client, stridewire_world world) {
+  const auto state = client->session.FindWorldState(world);
+  if (!state) return -1;
+  WorldView& view = *client->session.FindWorld(world);
+  results[0] = static_cast<double>(view.revision());
+  results[1] = view.newest_time_s();
+  results[2] = static_cast<double>(view.recording().bytes());
+  results[3] = view.recording().first_time_s();
+  results[4] = view.recording().last_time_s();
+  return static_cast<std::int32_t>(*state);
+}
+
+STRIDEWIRE_EXPORT(clear_recording) void ClearRecording(Client* client, stridewire_world world) {
+  if (WorldView* view = client->session.FindWorld(world)) view->recording().Clear();
+}
+
+/// Returns the number of avatars of a world that are not gone. results: 0 the address of their ids.
+STRIDEWIRE_EXPORT(avatars) std::size_t Avatars(Client* client, stridewire_world world) {
+  const WorldView* view = client->session.FindWorld(world);
+  client->avatars = view == nullptr ? std::vector<protocol::AvatarId>() : view->Avatars();
+  results[0] = Address(client->avatars);
+  return client->avatars.size();
+}
+
+/// Samples one avatar. Returns 0 if its pose is missing, 1 if it is interpolated and 2 if it is
+/// held. results: 0 number of joints, 1 address of the root's position, 2 address of the rotations,
+/// 3 tick, 4 flags (CrowdFlags), 5 time since the last pose if it is held.
+STRIDEWIRE_EXPORT(sample)
+std::uint32_t Sample(Client* client, stridewire_world world, protocol::AvatarId avatar,
+                     double time_s) {
+  const WorldView* view = client->session.FindWorld(world);
+  const PoseHistory* history = view == nullptr ? nullptr : view->Find(avatar);
+  if (history == nullptr || history->size() == 0) return 0;
+  const bool is_after_newest = time_s > history->stamp(history->size() - 1).time_s;
+  if (view->IsGone(avatar) && is_after_newest) return 0;
+  client->rotations.resize(history->joint_count());
+  const auto sampled = history->Sample(time_s, client->root_position_m, client->rotations);
+  if (!sampled) return 0;
+  const PoseStamp& stamp = history->stamp(sampled->index);
+  if (!sampled->interpolated && is_after_newest) ++client->held;
+  results[0] = static_cast<double>(history->joint_count());
+  results[1] = static_cast<double>(reinterpret_cast<std::uintptr_t>(&client->root_position_m));
+  results[2] = Address(client->rotations);
+  results[3] = static_cast<double>(stamp.tick);
+  results[4] = CrowdFlagsOf(stamp);
+  results[5] = sampled->interpolated ? 0.0 : time_s - stamp.time_s;
+  return sampled->interpolated ? 1 : 2;
+}
+
+/// Samples all avatars of a world and returns their number, from the recording if `recorded`.
+/// results: 0 number of joints, 1 address of the ids, 2 of the flags, 3 of the roots, 4 of the
+/// rotations. The memory is valid until the next call of this function.
+STRIDEWIRE_EXPORT(sample_all)
+std::size_t SampleAll(Client* client, stridewire_world world, double time_s, bool recorded) {
+  WorldView* view = client->session.FindWorld(world);
+  CrowdPose& crowd = client->crowd;
+  if (view == nullptr) {
+    crowd.Resize(0, 0);
+  } else if (recorded) {
+    view->recording().SampleAll(
+        time_s, [view](protocol::AvatarId avatar) { return view->Admits(avatar); }, crowd);
+  } else {
+    view->SampleAll(time_s, crowd, client->held);
+  }
+  SetCrowdResults(crowd);
+  return crowd.avatars.size();
+}
+
+}  // namespace stridewire::client
+
+/// Replaces the function of the C library, from which its allocator gets memory. Engines may copy
+/// the whole memory when it grows, so it grows by a quarter instead of 64 KiB at a time.
+// NOLINTNEXTLINE(readability-identifier-naming): the name of the C library.
+extern "C" void* sbrk(std::intptr_t increment) {
+  constexpr std::size_t kPageBytes = std::size_t{64} << 10;
+  constexpr std::size_t kLeastPages = 64;
+  constexpr std::size_t kMostPages = 1024;
+  static std::size_t end = __builtin_wasm_memory_size(0) * kPageBytes;
+  const std::size_t size = __builtin_wasm_memory_size(0) * kPageBytes;
+  const auto wanted = static_cast<std::size_t>(increment);
+  if (increment < 0) return reinterpret_cast<void*>(std::intptr_t{-1});
+  if (wanted > size - end) {
+    const std::size_t least = (wanted - (size - end) + kPageBytes - 1) / kPageBytes;
+    const std::size_t pages =
+        std::max(least, std::clamp(size / kPageBytes / 4, kLeastPages, kMostPages));
+    if (__builtin_wasm_memory_grow(0, pages) == SIZE_MAX &&
+        __builtin_wasm_memory_grow(0, least) == SIZE_MAX) {
+      return reinterpret_cast<void*>(std::intptr_t{-1});
+    }
+  }
+  const std::size_t start = end;
+  end += wanted;
+  return reinterpret_cast<void*>(start);
+}
