@@ -71,6 +71,12 @@ struct HermiteCurve {
            duration_s * ((u3 - 2.0 * u2 + u) * from_velocity + (u3 - u2) * to_velocity) +
            (3.0 * u2 - 2.0 * u3) * to;
   }
+  [[nodiscard]] DVec3 VelocityAt(double time_s) const {
+    const double u = std::clamp(time_s / duration_s, 0.0, 1.0);
+    const double u2 = u * u;
+    return 6.0 * (u - u2) / duration_s * (to - from) + (3.0 * u2 - 4.0 * u + 1.0) * from_velocity +
+           (3.0 * u2 - 2.0 * u) * to_velocity;
+  }
 };
 
 class StepGenerator {
@@ -187,13 +193,18 @@ class StepGenerator {
   [[nodiscard]] DVec3 RootAt(double time_s) const {
     const double generic = GenericAt(time_s);
     const double share = std::min(1.0, ShareAt(time_s));
-    const DVec3 deviation = stride_.At(generic).root_m - captured_.At(CapturedTimeAt(generic));
+    const double captured_s = CapturedTimeAt(generic);
+    DVec3 deviation = share * (stride_.At(generic).root_m - captured_.At(captured_s));
     const double heading = HeadingAt(time_s);
+    // The speed of the pelvis varies in proportion to the speed of the walk.
+    const double usual_m_s = share * captured_.VelocityAt(captured_s).z;
+    const double speed_m_s = RotateYaw(-heading, root_.VelocityAt(time_s)).z;
+    if (usual_m_s > 0.0) deviation.z *= std::clamp(speed_m_s / usual_m_s, 0.0, 1.0);
     // The ball of the fixed foot is the origin, and the root is midway between the feet. In
     // strides, momentum carries the body, so that less weight has to shift.
     const double to_fixed_m = -0.5 * (feet_.start_m.x + feet_.end_m.x) * 0.5;
     const DVec3 sway(kSwayShare * (1.0 - share) * to_fixed_m * Bump(time_s / end_s_), 0.0, 0.0);
-    return root_.At(time_s) + RotateYaw(heading, share * deviation + sway);
+    return root_.At(time_s) + RotateYaw(heading, deviation + sway);
   }
 
   [[nodiscard]] DVec3 BallAt(Foot foot, double time_s) const {

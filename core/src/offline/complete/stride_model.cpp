@@ -6,6 +6,7 @@
 #include "base/easing.h"
 #include "offline/base/statistics.h"
 #include "offline/extract/mirror.h"
+#include "runtime/library/keytimes.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire::complete {
@@ -89,30 +90,43 @@ std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
   return {};
 }
 
-// Smooths the body over time, but not the feet. The window becomes shorter towards both ends, which
-// do not change.
-void SmoothBody(double window_s, StrideModel& model) {
-  std::vector<double> times_s;
-  for (std::size_t p = 0; p < model.points.size(); ++p) {
-    times_s.push_back(TimeAtPoint(model.keytimes_s, p));
+// Returns the posture at a time of a stride, which may be outside of it. There, the stride
+// continues as its point reflection about its end.
+PostureSample SampleAround(const StrideModel& model, double time_s) {
+  const double first_s = model.keytimes_s.front();
+  const double last_s = model.keytimes_s.back();
+  const bool is_before = time_s < first_s;
+  if (!is_before && time_s <= last_s) return model.At(GenericTime(model.keytimes_s, time_s));
+  const PostureSample& end = is_before ? model.points.front() : model.points.back();
+  const double inside_s = 2.0 * (is_before ? first_s : last_s) - time_s;
+  PostureSample sample =
+      model.At(GenericTime(model.keytimes_s, std::clamp(inside_s, first_s, last_s)));
+  sample.root_m = 2.0 * end.root_m - sample.root_m;
+  for (std::size_t j = 0; j < sample.rotations.size(); ++j) {
+    sample.rotations[j] = end.rotations[j] * glm::conjugate(sample.rotations[j]) * end.rotations[j];
   }
-  const std::vector<PostureSample> rough = model.points;
-  for (std::size_t p = 1; p + 1 < rough.size(); ++p) {
-    const double half_s =
-        std::min({window_s, times_s[p] - times_s.front(), times_s.back() - times_s[p]});
+  return sample;
+}
+
+// Smooths the body over time, but not the feet. Both ends of the stride do not change.
+void SmoothBody(double window_s, StrideModel& model) {
+  // Samples on each side of a point. They are evenly spaced in time, which the points are not, so
+  // that even motion remains even.
+  constexpr int kSide = 8;
+  const StrideModel rough = model;
+  for (std::size_t p = 1; p + 1 < rough.points.size(); ++p) {
+    const double time_s = TimeAtPoint(model.keytimes_s, p);
     PostureSample& point = model.points[p];
     double sum = 0.0;
-    for (std::size_t k = 0; k < rough.size(); ++k) {
-      // The points are not evenly spaced in time, so each counts for the time that it stands for.
-      const double spacing_s =
-          0.5 * (times_s[std::min(k + 1, rough.size() - 1)] - times_s[k == 0 ? 0 : k - 1]);
-      const double near = 1.0 - std::fabs(times_s[k] - times_s[p]) / half_s;
-      if (near <= 0.0) continue;
-      sum += spacing_s * near;
-      const double share = spacing_s * near / sum;
-      point.root_m += share * (rough[k].root_m - point.root_m);
+    for (int k = -kSide; k <= kSide; ++k) {
+      const double away = static_cast<double>(k) / (kSide + 1);
+      const double weight = 1.0 - std::fabs(away);
+      sum += weight;
+      const double share = weight / sum;
+      const PostureSample near = SampleAround(rough, time_s + away * window_s);
+      point.root_m += share * (near.root_m - point.root_m);
       for (std::size_t j = 0; j < point.rotations.size(); ++j) {
-        point.rotations[j] = Blend(point.rotations[j], rough[k].rotations[j], share);
+        point.rotations[j] = Blend(point.rotations[j], near.rotations[j], share);
       }
     }
   }

@@ -8,6 +8,7 @@
 
 #include "captured_library.h"
 #include "offline/builtin/builtin_library.h"
+#include "offline/complete/stride_model.h"
 #include "offline/inspect/self_check.h"
 #include "reframing.h"
 #include "runtime/library/keytimes.h"
@@ -138,6 +139,25 @@ TEST(CompleteLibrary, StepsAreSmooth) {
         ASSERT_LT(LargestJointAngle(example.clip.frame(f - 1), example.clip.frame(f)), limit_rad)
             << example.source << ", frame " << f;
       }
+    }
+  }
+}
+
+// Smoothing the mean stride keeps the pelvis moving evenly, although the points of the stride are
+// not evenly spaced in time.
+TEST(MeasureStride, KeepsTheSpeedOfThePelvisEven) {
+  STRIDEWIRE_SKIP_WITHOUT_TAKES({"16"});
+  const RawLibrary library = AssembleTakes(TakesOf({"16"}), {.mirror = true});
+  for (const Foot moving : {Foot::kLeft, Foot::kRight}) {
+    const auto stride = complete::MeasureStride(library, moving);
+    ASSERT_TRUE(stride.has_value());
+    const auto speed = [&](std::size_t point) {
+      const double length_m = stride->points[point + 1].root_m.z - stride->points[point].root_m.z;
+      return length_m / (complete::TimeAtPoint(stride->keytimes_s, point + 1) -
+                         complete::TimeAtPoint(stride->keytimes_s, point));
+    };
+    for (std::size_t point = 0; point + 2 < stride->points.size(); ++point) {
+      EXPECT_NEAR(speed(point), speed(point + 1), 0.1) << "point " << point;
     }
   }
 }
