@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "runtime/plan/root_approach.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 
@@ -97,6 +98,7 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScr
                           .pose = pose,
                           .movement = movement};
     ContinueFeet(keeps_speed, PlanFeet(job, landing));
+    PlanRootApproach(job);
     LiftWhileSettling(job);
     if (begins_planting) BeginPlantFade(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);

@@ -146,6 +146,9 @@ void PlanFields(Stream& stream, P& plan) {
   }
   Vector(stream, plan.root_residual_m);
   Vector(stream, plan.root_residual_m_s);
+  Vector(stream, plan.root_approach.offset_m);
+  Vector(stream, plan.root_approach.offset_m_s);
+  stream.F64(plan.root_approach.over_s);
   bool settles = plan.plant_fade_s > 0.0;
   stream.Bool(settles);
   if (!settles) return;

@@ -71,11 +71,21 @@ struct FootResidual {
   double over_s = 0.2;  ///< Time after which the residual is zero.
 };
 
+/// Horizontal motion of the root that is added so that it approaches its planned place above the
+/// standing feet over `over_s`. The rotations of the legs would take it there while the difference
+/// pose fades out, which is too abrupt if the place is far away or if the root moves at another
+/// speed.
+struct RootApproach {
+  DVec3 offset_m = DVec3(0.0);    ///< Distance that the rotations of the legs move the root.
+  DVec3 offset_m_s = DVec3(0.0);  ///< Its velocity at the start of the movement.
+  double over_s = 0.0;            ///< If less than Movement::ease_out_s, nothing is added.
+};
+
 /// A foot plan in the layout that the planting kernels read: groups of four floats, with positions
 /// relative to the base of the movement. Contains two trajectories and their common part
 /// (PackFootPlan).
 inline constexpr std::size_t kPackedTrajectoryFloats = 60;
-inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 12;
+inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 20;
 using PackedFootPlan = std::array<float, kPackedPlanFloats>;
 
 /// The plan for both feet of a movement. Together with the blended pose and the time it determines
@@ -89,11 +99,11 @@ struct FootPlan {
 
   std::array<FootTrajectory, 2> feet;     ///< [foot]
   std::array<FootResidual, 2> residuals;  ///< [foot]
-  DVec3 root_residual_m =
-      /// Residual of the root. It is separate, because the root may have followed the other foot
-      /// before.
-      DVec3(0.0);
+  /// Residual of the root. It is separate, because the root may have followed the other foot
+  /// before.
+  DVec3 root_residual_m = DVec3(0.0);
   DVec3 root_residual_m_s = DVec3(0.0);
+  RootApproach root_approach;
   /// On terrain, soles are lifted out of the ground that they leave and land on. On level ground
   /// the blend keeps them out well enough, and knees move less without the lift.
   bool keeps_above_ground = false;

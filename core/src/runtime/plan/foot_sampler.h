@@ -30,6 +30,8 @@ class FootSampler {
   /// may only contain rows of this movement.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
+  /// Returns the root at the `i`th time, in world space.
+  [[nodiscard]] DVec3 Root(std::size_t i) const { return DVec3(At(roots_m_, i)); }
   /// Returns the ball of a foot at the `i`th time, in world space.
   [[nodiscard]] DVec3 Ball(std::size_t i, Foot foot) const;
   /// Returns a foot at the `i`th time.

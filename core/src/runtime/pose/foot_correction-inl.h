@@ -130,16 +130,35 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   return c;
 }
 
+// Data of FootPlan::root_residual_m and FootPlan::root_approach.
+template <typename Number, typename Vector>
+struct RootResidualOf {
+  Vector offset, velocity;
+  Vector approach, approach_velocity;
+  Number approach_over_s;
+};
+
 // Adds the remaining part of the root's residual to its shift. The height takes longer than the
 // horizontal part, because a body climbs as long as its leg stretches.
 template <typename Number, typename Vector, typename Timing>
 STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timing,
-                                         const Vector& residual, const Vector& velocity) {
+                                         const RootResidualOf<Number, Vector>& residual) {
   const Number since_s = timing.time_s - timing.start_offset_s;
-  const Number flat = EaseOut(DivideBy(since_s, kRootShiftS));
+  const Number over_s = Max(residual.approach_over_s, timing.ease_out_s);
+  const Number flat =
+      EaseOut(since_s / Max(Constant<Number>(kRootShiftS), residual.approach_over_s));
   const Number rise = EaseOut(since_s / Max(Constant<Number>(kRootShiftS),
                                             Constant<Number>(kRootRisePart) * timing.duration_s));
-  const Number seconds = timing.ease_out_s * EaseOutSlope(timing.OfEaseOut(since_s));
-  return AddBoth(shift, Vector{flat * residual.x, rise * residual.y, flat * residual.z},
-                 velocity * seconds);
+  // The difference pose moves the root by `blended` of the approach.
+  const Number faded = timing.OfEaseOut(since_s);
+  const Number blended = EaseOut(faded);
+  const Number blended_s = timing.ease_out_s * EaseOutSlope(faded);
+  const Number part = EaseOut(since_s / over_s);
+  const Number part_s = over_s * EaseOutSlope(since_s / over_s);
+  const Vector& offset = residual.offset;
+  const Vector& velocity = residual.velocity;
+  const Vector approached =
+      residual.approach * (part - blended) + residual.approach_velocity * (part_s - blended_s);
+  return AddBoth(shift + approached, Vector{flat * offset.x, rise * offset.y, flat * offset.z},
+                 Vector{part_s * velocity.x, blended_s * velocity.y, part_s * velocity.z});
 }

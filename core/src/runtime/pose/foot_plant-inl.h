@@ -95,7 +95,7 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
 
 // The part of a movement's plan that concerns both feet, and the time to evaluate.
 struct PlanCommon {
-  SoaVec3 root_residual, root_residual_velocity;
+  RootResidualOf<Float, SoaVec3> root_residual;
   Float extra_turn, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
   Float time_s;
   Float per_duration, per_ease_out;  // Reciprocals of duration_s and ease_out_s.
@@ -343,12 +343,15 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   {
     const float* at = plan + 2 * kPackedTrajectoryFloats * kBlock;
     SoaQuat q = LoadQuat(at);
-    common.root_residual = XyzOf(q), common.extra_turn = q.w;
+    common.root_residual.offset = XyzOf(q), common.extra_turn = q.w;
     q = LoadQuat(at + 4 * kBlock);
-    common.root_residual_velocity = XyzOf(q), common.duration_s = q.w;
+    common.root_residual.velocity = XyzOf(q), common.duration_s = q.w;
     q = LoadQuat(at + 8 * kBlock);
     common.start_offset_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
     common.plant_fade_s = q.w;
+    q = LoadQuat(at + 12 * kBlock);
+    common.root_residual.approach = XyzOf(q), common.root_residual.approach_over_s = q.w;
+    common.root_residual.approach_velocity = LoadVec3(at + 16 * kBlock);
     common.per_duration = Float(1.0f) / common.duration_s;
     common.per_ease_out = Float(1.0f) / common.ease_out_s;
   }
@@ -414,8 +417,7 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
     ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
     shift = shift + c.root;
   });
-  shift =
-      AddRootResidual<Float>(shift, common, common.root_residual, common.root_residual_velocity);
+  shift = AddRootResidual<Float>(shift, common, common.root_residual);
 
   Float lowers[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {

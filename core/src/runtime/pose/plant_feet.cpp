@@ -137,9 +137,15 @@ FeetCorrection CorrectFeet(const Movement& movement, double time_s, const FeetAt
     corrections.feet[f] = CorrectFoot(movement, foot, time_s, blended[f]);
     corrections.root_m += RootShare(corrections.feet[f]);
   }
+  const FootPlan& plan = movement.feet;
+  const RootApproach& approach = plan.root_approach;
+  const RootResidualOf<double, DVec3> residual = {.offset = plan.root_residual_m,
+                                                  .velocity = plan.root_residual_m_s,
+                                                  .approach = approach.offset_m,
+                                                  .approach_velocity = approach.offset_m_s,
+                                                  .approach_over_s = approach.over_s};
   corrections.root_m =
-      AddRootResidual<double>(corrections.root_m, Timing(movement, time_s),
-                              movement.feet.root_residual_m, movement.feet.root_residual_m_s);
+      AddRootResidual<double>(corrections.root_m, Timing(movement, time_s), residual);
   return corrections;
 }
 
@@ -279,6 +285,8 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
   add(plan.root_residual_m_s, SpreadTime(movement));
   add({movement.start_offset_s, movement.ease_out_s, plan.keeps_above_ground ? 1.0 : 0.0},
       plan.plant_fade_s);
+  add(plan.root_approach.offset_m, plan.root_approach.over_s);
+  add(plan.root_approach.offset_m_s, 0.0);
   return packed;
 }
 

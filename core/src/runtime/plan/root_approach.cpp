@@ -1,0 +1,77 @@
+#include "runtime/plan/root_approach.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "runtime/plan/foot_sampler.h"
+
+namespace stridewire {
+namespace {
+
+// The blend from the previous pose accelerates the root by at most kMaxAccelerationMPerS2, as far
+// as that is possible within kMaxApproachS. In captures of starts and stops, the whole acceleration
+// is 4 to 4.6 m/s2.
+constexpr double kMaxAccelerationMPerS2 = 2.5;
+constexpr double kMaxApproachS = 0.8;
+// On terrain it is shorter, because a leg that climbs or descends reaches less far.
+constexpr double kMaxTerrainApproachS = 0.35;
+constexpr double kApproachStepS = 0.02;
+
+double HorizontalLength(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
+
+// Returns the largest acceleration of the cubic curve that begins at `offset_m` with velocity
+// `offset_m_s` and comes to rest at 0 after `over_s`.
+double PeakAcceleration(const DVec3& offset_m, const DVec3& offset_m_s, double over_s) {
+  const DVec3 bend = 6.0 / (over_s * over_s) * offset_m;
+  const DVec3 slope = 2.0 / over_s * offset_m_s;
+  return std::max(HorizontalLength(bend + 2.0 * slope), HorizontalLength(bend + slope));
+}
+
+// Returns the shortest time in which the root can go from `offset_m` with velocity `offset_m_s` to
+// rest at 0, but at least `least_s`.
+double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least_s, double most_s) {
+  double over_s = least_s;
+  while (over_s < most_s &&
+         PeakAcceleration(offset_m, offset_m_s, over_s) > kMaxAccelerationMPerS2) {
+    over_s = std::min(over_s + kApproachStepS, most_s);
+  }
+  return over_s;
+}
+
+}  // namespace
+
+void PlanRootApproach(const FootPlanJob& job) {
+  Movement& movement = job.movement;
+  FootPlan& plan = movement.feet;
+  if (!plan.is_active || job.library.group(movement.group).kind == MovementKind::kStand) return;
+  const double start_s = movement.start_offset_s;
+  const double ease_out_s = movement.ease_out_s;
+  FootSampler sampler(job.scratch, job.pose);
+  const double step_s = std::min(kBlendStepS, 0.5 * ease_out_s);
+  // With the difference pose, then without it.
+  sampler.Sample(movement, std::array{start_s, start_s + step_s, start_s, start_s + step_s}, 2);
+  const auto above_feet = [&](std::size_t i) {
+    DVec3 root = sampler.Root(i);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      root -= plan.foot(foot).root_weight * sampler.Ball(i, foot);
+    }
+    return DVec3(root.x, 0.0, root.z);
+  };
+  const DVec3 offset_m = above_feet(0) - above_feet(2);
+  DVec3 offset_m_s(0.0);
+  if (movement.is_inertial) {
+    const DVec3 next_m = above_feet(1) - above_feet(3);
+    const double eased = step_s / ease_out_s;
+    offset_m_s = (next_m - EaseOut(eased) * offset_m) / (ease_out_s * EaseOutSlope(eased));
+  }
+  const double most_s = std::min(plan.keeps_above_ground ? kMaxTerrainApproachS : kMaxApproachS,
+                                 movement.duration_s() - start_s);
+  plan.root_approach = {
+      .offset_m = offset_m,
+      .offset_m_s = offset_m_s,
+      .over_s = ApproachTime(offset_m + plan.root_residual_m, offset_m_s + plan.root_residual_m_s,
+                             ease_out_s, std::max(ease_out_s, most_s))};
+}
+
+}  // namespace stridewire
