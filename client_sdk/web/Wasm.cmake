@@ -73,10 +73,7 @@ stridewire_wasm_object(replica_set ${PROJECT_SOURCE_DIR}/client_sdk/src/replica/
 stridewire_wasm_object(client_module ${CMAKE_CURRENT_SOURCE_DIR}/wasm/client_module.cpp)
 stridewire_wasm_object(compact_kernel ${PROJECT_SOURCE_DIR}/protocol/src/compact_kernel.cpp)
 stridewire_wasm_object(quantise_kernel ${PROJECT_SOURCE_DIR}/protocol/src/quantise_kernel.cpp)
-# Highway 1.0.3 has no arithmetic with doubles for WebAssembly, which the pose kernels need. Their
-# bytes are the same without SIMD.
-stridewire_wasm_object(pose_kernels ${PROJECT_SOURCE_DIR}/core/src/runtime/pose/pose_kernels.cpp
-                       -DHWY_COMPILE_ONLY_SCALAR)
+stridewire_wasm_object(pose_kernels ${PROJECT_SOURCE_DIR}/core/src/runtime/pose/pose_kernels.cpp)
 
 # A stack overflow stops the module instead of overwriting data, because the stack is first in
 # memory.
