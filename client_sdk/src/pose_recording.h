@@ -12,6 +12,7 @@
 #include "crowd_pose.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
+#include "stridewire/runtime/pose.h"
 
 namespace stridewire::client {
 
