@@ -111,6 +111,8 @@ class TypeScript:
         table = self.schema.tables.get(f.type)
         if table is not None and table.get("native") == "ParameterSet":
             info["parameters"] = True
+        if "only" in f:
+            info["only"] = [lower_camel(name) for name in f.get("only").split()]
         flags = ("deprecated", "inverted", "number", "optional", "shared")
         return info | {name: True for name in flags if name in f}
 
@@ -159,6 +161,8 @@ export interface FieldInfo {
   readonly number?: boolean;
   /** The table may be absent; it is then null. */
   readonly optional?: boolean;
+  /** Values of the field `type` that use the field. It is absent for others. */
+  readonly only?: readonly string[];
   /** The list is an object of parameters. */
   readonly parameters?: boolean;
   /** Equal texts of a message are stored once. */

@@ -47,14 +47,21 @@ function readTable(view: DataView, at: number, info: TableInfo): unknown {
   if (info.alone) return readField(view, fieldAt(view, at, 0), info.fields[0]!);
   const table: {[name: string]: unknown} = {};
   info.fields.forEach((field, slot) => {
-    if (!field.deprecated) table[field.name] = readField(view, fieldAt(view, at, slot), field);
+    if (field.deprecated) return;
+    const unused = field.only !== undefined && !field.only.includes(table['type'] as string);
+    table[field.name] = readField(view, unused ? 0 : fieldAt(view, at, slot), field);
   });
-  // The field `must_be_near` is absent, and its opposite true, where it has no meaning.
-  if (info.name === 'RequestItem' &&
-      (table['exactOnly'] || !['step', 'jump'].includes(table['type'] as string))) {
-    table['allowNearest'] = false;
-  }
+  if (info.name === 'RequestItem') dropUnused(table);
   return table;
+}
+
+/** Resets the fields of a request that have no meaning. The module does not check them. */
+function dropUnused(item: {[name: string]: unknown}): void {
+  if (item['exactOnly'] || !['step', 'jump'].includes(item['type'] as string)) {
+    item['allowNearest'] = false;
+  }
+  Object.assign(item, item['atM'] === null ? {headingRad: null}
+                                           : {lengthM: 0, sideM: null, heightM: 0, turnRad: 0});
 }
 
 function readStruct(view: DataView, at: number, info: TableInfo): unknown {
