@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "offline/base/text.h"
+#include "offline/capture/joint_noise.h"
 
 namespace stridewire {
 namespace {
@@ -20,7 +21,6 @@ constexpr double kJumpMinRad = 12.0 * kDegree;
 constexpr double kJumpMaxRad = 60.0 * kDegree;
 constexpr double kSpikeS = 0.04;
 constexpr double kSpreadS = 0.08;
-constexpr double kLimbEndM = 0.15;
 constexpr double kRootOffPathM = 0.01;
 constexpr double kRootAcceleration_m_s2 = 40.0;
 constexpr int kMedianReach = 2;
@@ -49,28 +49,6 @@ void Interpolate(Track& track, int before, int after) {
     const float fraction = static_cast<float>(f - before) / static_cast<float>(after - before);
     track[f] = Normalise(from * SlerpFromIdentity(turn, fraction));
   }
-}
-
-// Returns the length of the body beyond a joint.
-double ReachBeyond(const Skeleton& skeleton, int joint) {
-  std::vector<double> distance(skeleton.joints.size(), -1.0);
-  distance[static_cast<std::size_t>(joint)] = 0.0;
-  double reach = 0.0;
-  for (std::size_t j = static_cast<std::size_t>(joint) + 1; j < distance.size(); ++j) {
-    const double before = distance[static_cast<std::size_t>(skeleton.joints[j].parent)];
-    if (before < 0.0) continue;
-    distance[j] = before + glm::length(skeleton.joints[j].offset_m);
-    reach = std::max(reach, distance[j]);
-  }
-  for (const EndSite& site : skeleton.end_sites) {
-    const double before = distance[static_cast<std::size_t>(site.joint)];
-    if (before >= 0.0) reach = std::max<double>(reach, before + glm::length(site.offset_m));
-  }
-  return reach;
-}
-
-bool IsLimbEnd(const Skeleton& skeleton, int joint) {
-  return ReachBeyond(skeleton, joint) < kLimbEndM;
 }
 
 void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& clip,

@@ -8,6 +8,7 @@
 #include "offline/base/horizontal_distance.h"
 #include "offline/base/text.h"
 #include "offline/capture/glitch_repair.h"
+#include "offline/capture/joint_noise.h"
 #include "offline/extract/body_tracks.h"
 #include "offline/extract/explain.h"
 #include "offline/extract/ground.h"
@@ -54,6 +55,7 @@ class Extractor {
     for (std::string& sentence : DescribeRepairs(capture_.skeleton, glitches, clip_.fps)) {
       out_.notes.push_back(std::move(sentence));
     }
+    RemoveNoise();
     tracks_ = TrackBody(capture_.skeleton, clip_, first_frame_);
     const bool is_walk_on_the_spot = HandleWalkOnTheSpot();
     contacts_ = FindContacts(tracks_, options_.contacts);
@@ -106,6 +108,15 @@ class Extractor {
                all.end - frames.end, (all.end - frames.end) / clip_.fps));
       clip_.Resize(frames.end, clip_.joint_count);
     }
+  }
+
+  void RemoveNoise() {
+    std::string names;
+    for (const int joint : RemoveJointNoise(capture_.skeleton, first_frame_, clip_)) {
+      names += (names.empty() ? "" : ", ") +
+               capture_.skeleton.joints[static_cast<std::size_t>(joint)].name;
+    }
+    if (!names.empty()) out_.notes.push_back("smoothed joints that vibrate: " + names);
   }
 
   // Derives the root motion of a figure that walks on the spot, or rejects the capture and returns

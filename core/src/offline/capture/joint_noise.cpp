@@ -1,0 +1,150 @@
+#include "offline/capture/joint_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stridewire {
+namespace {
+
+constexpr double kLimbEndM = 0.15;
+
+// A filter for joints that vibrate. Its mean reaches to two standard deviations.
+struct NoiseFilter {
+  double least_rad_s2;  // Joints with smaller angular accelerations are not filtered.
+  double median_reach_s;
+  double deviation_s;  // Standard deviation of the weights of the mean.
+};
+constexpr NoiseFilter kLimbEndFilter = {1000.0, 1.0 / 30, 0.025};
+constexpr NoiseFilter kAnkleFilter = {2000.0, 0.0, 0.010};
+constexpr double kAccelerationPercentile = 0.99;
+
+// Returns the length of the body beyond a joint.
+double ReachBeyond(const Skeleton& skeleton, int joint) {
+  std::vector<double> distance(skeleton.joints.size(), -1.0);
+  distance[static_cast<std::size_t>(joint)] = 0.0;
+  double reach = 0.0;
+  for (std::size_t j = static_cast<std::size_t>(joint) + 1; j < distance.size(); ++j) {
+    const double before = distance[static_cast<std::size_t>(skeleton.joints[j].parent)];
+    if (before < 0.0) continue;
+    distance[j] = before + glm::length(skeleton.joints[j].offset_m);
+    reach = std::max(reach, distance[j]);
+  }
+  for (const EndSite& site : skeleton.end_sites) {
+    const double before = distance[static_cast<std::size_t>(site.joint)];
+    if (before >= 0.0) reach = std::max<double>(reach, before + glm::length(site.offset_m));
+  }
+  return reach;
+}
+
+bool IsAnkle(const Skeleton& skeleton, int joint) {
+  return std::ranges::any_of(skeleton.legs, [&](const Leg& leg) { return leg.ankle == joint; });
+}
+
+// The rotations of a joint in successive frames.
+using RotationTrack = std::vector<Quat>;
+
+// The rotations around a frame.
+class Window {
+ public:
+  Window(const RotationTrack& track, int frame, int reach)
+      : track_(track),
+        frame_(frame),
+        begin_(std::max(frame - reach, 0)),
+        end_(std::min(frame + reach + 1, static_cast<int>(track.size()))) {}
+
+  // Returns the rotation that differs least from all others.
+  [[nodiscard]] Quat Median() const {
+    Quat best = At(frame_);
+    double least = HUGE_VAL;
+    for (int f = begin_; f < end_; ++f) {
+      double sum = 0.0;
+      for (int g = begin_; g < end_; ++g) sum += AngleBetween(At(f), At(g));
+      if (sum < least) {
+        least = sum;
+        best = At(f);
+      }
+    }
+    return best;
+  }
+
+  // Returns the mean with Gaussian weights. `deviation` is in frames.
+  [[nodiscard]] Quat Mean(double deviation) const {
+    Quat sum(0.0f, 0.0f, 0.0f, 0.0f);
+    for (int f = begin_; f < end_; ++f) {
+      const double distance = (f - frame_) / deviation;
+      const auto weight = static_cast<float>(std::exp(-0.5 * distance * distance));
+      sum += At(f) * (Dot(At(f), At(frame_)) < 0.0f ? -weight : weight);
+    }
+    return Normalise(sum);
+  }
+
+ private:
+  [[nodiscard]] const Quat& At(int frame) const { return track_[static_cast<std::size_t>(frame)]; }
+
+  const RotationTrack& track_;
+  int frame_;
+  int begin_;
+  int end_;
+};
+
+// Returns the small rotation from `a` to `b` as a rotation vector.
+Vec3 RotationVector(const Quat& a, const Quat& b) {
+  const Quat turn = glm::conjugate(a) * b;
+  return (turn.w < 0.0f ? -2.0f : 2.0f) * Vec3(turn.x, turn.y, turn.z);
+}
+
+// Returns the 99th percentile of the angular acceleration.
+double LargestAcceleration(const RotationTrack& track, double fps) {
+  std::vector<double> accelerations;
+  for (std::size_t f = 1; f + 1 < track.size(); ++f) {
+    const Vec3 change =
+        RotationVector(track[f], track[f + 1]) - RotationVector(track[f - 1], track[f]);
+    accelerations.push_back(fps * fps * static_cast<double>(glm::length(change)));
+  }
+  if (accelerations.empty()) return 0.0;
+  const auto last = static_cast<double>(accelerations.size() - 1);
+  const auto rank = static_cast<std::ptrdiff_t>(kAccelerationPercentile * last);
+  std::ranges::nth_element(accelerations, accelerations.begin() + rank);
+  return accelerations[static_cast<std::size_t>(rank)];
+}
+
+void Apply(const NoiseFilter& filter, double fps, RotationTrack& track) {
+  const auto frames = [&](double seconds) { return static_cast<int>(std::lround(seconds * fps)); };
+  RotationTrack medians(track.size());
+  const auto count = static_cast<int>(track.size());
+  for (int f = 0; f < count; ++f) {
+    medians[static_cast<std::size_t>(f)] = Window(track, f, frames(filter.median_reach_s)).Median();
+  }
+  for (int f = 0; f < count; ++f) {
+    track[static_cast<std::size_t>(f)] =
+        Window(medians, f, frames(2.0 * filter.deviation_s)).Mean(filter.deviation_s * fps);
+  }
+}
+
+}  // namespace
+
+bool IsLimbEnd(const Skeleton& skeleton, int joint) {
+  return ReachBeyond(skeleton, joint) < kLimbEndM;
+}
+
+std::vector<int> RemoveJointNoise(const Skeleton& skeleton, int first_frame, Clip& clip) {
+  std::vector<int> filtered;
+  const int count = std::max(0, clip.frame_count() - first_frame);
+  RotationTrack track(static_cast<std::size_t>(count));
+  for (int joint = 1; joint < skeleton.joint_count(); ++joint) {
+    const bool is_ankle = IsAnkle(skeleton, joint);
+    if (!is_ankle && !IsLimbEnd(skeleton, joint)) continue;
+    const NoiseFilter& filter = is_ankle ? kAnkleFilter : kLimbEndFilter;
+    const auto rotation = [&](int frame) -> Quat& {
+      return clip.frame(first_frame + frame).rotations[static_cast<std::size_t>(joint)];
+    };
+    for (int f = 0; f < count; ++f) track[static_cast<std::size_t>(f)] = rotation(f);
+    if (LargestAcceleration(track, clip.fps) < filter.least_rad_s2) continue;
+    Apply(filter, clip.fps, track);
+    for (int f = 0; f < count; ++f) rotation(f) = track[static_cast<std::size_t>(f)];
+    filtered.push_back(joint);
+  }
+  return filtered;
+}
+
+}  // namespace stridewire
