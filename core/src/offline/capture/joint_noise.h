@@ -11,7 +11,7 @@ namespace stridewire {
 /// are beyond them.
 [[nodiscard]] bool IsLimbEnd(const Skeleton& skeleton, int joint);
 
-/// Removes noise from feet and hands in place (decision 0044). Otherwise, the toes of standing feet
+/// Removes noise from feet and hands in place (decision 0046). Otherwise, the toes of standing feet
 /// flutter by several degrees, and soles leave the ground. Joints are filtered if their angular
 /// acceleration exceeds a limit in more than 1 % of the frames.
 ///
