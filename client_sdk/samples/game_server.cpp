@@ -93,7 +93,9 @@ class GameServer {
         steps_ += event.kind <= STRIDEWIRE_KIND_STEP_RIGHT;
         break;
       case STRIDEWIRE_EVENT_FOOT_STRIKE: ++foot_strikes_; break;
-      case STRIDEWIRE_EVENT_REJECTED: ++refused_; break;
+      case STRIDEWIRE_EVENT_REJECTED:
+        refused_ += event.outcome == STRIDEWIRE_OUTCOME_REJECTED;
+        break;
       case STRIDEWIRE_EVENT_CONNECTION_LOST:
         std::printf("%s: connection lost, reconnecting\n", settings_.world.c_str());
         break;

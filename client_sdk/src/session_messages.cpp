@@ -37,6 +37,7 @@ stridewire_event_type ToEventType(protocol::EventType type) {
 }
 static_assert(STRIDEWIRE_EVENT_LEFT - STRIDEWIRE_EVENT_ACCEPTED ==
               static_cast<int>(protocol::EventType::kLeft));
+static_assert(STRIDEWIRE_OUTCOME_REMOVED == static_cast<int>(protocol::RequestOutcome::kRemoved));
 
 }  // namespace
 
@@ -422,6 +423,7 @@ void Session::Handle(const protocol::Events& message, double now_s) {
     event.nearest_turn_rad = e.nearest.turn_rad;
     event.nearest_heading_rad = e.nearest.heading_rad;
     event.speed_m_s = e.speed_m_s;
+    event.outcome = static_cast<stridewire_outcome>(e.outcome);
     events_.Push(event);
   }
 }

@@ -32,6 +32,8 @@ constexpr Entry kEntries[] = {
     {STRIDEWIRE_UNEXPECTED_MESSAGE, "unexpected_message",
      "The message is not allowed in this state."},
     {STRIDEWIRE_ALREADY_JOINED, "already_joined", "The world is already joined."},
+    {STRIDEWIRE_DROPPED, "dropped",
+     "The request was cancelled or replaced, or its avatar was removed."},
     {STRIDEWIRE_BUFFER_TOO_SMALL, "buffer_too_small", "The buffer is too small."},
     {STRIDEWIRE_COMMANDS_FULL, "commands_full", "Too many commands are unanswered."},
     {STRIDEWIRE_CLOSED, "closed", "The client is not connected and does not try to connect."},

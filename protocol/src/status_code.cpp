@@ -21,6 +21,7 @@ std::string_view StatusCodeName(StatusCode code) {
     case StatusCode::kForgotten: return "forgotten";
     case StatusCode::kUnexpectedMessage: return "unexpected_message";
     case StatusCode::kAlreadyJoined: return "already_joined";
+    case StatusCode::kDropped: return "dropped";
     case StatusCode::kMalformed: return "malformed";
     case StatusCode::kNoMovement: return "no_movement";
     case StatusCode::kTimeout: return "timeout";

@@ -319,6 +319,11 @@ void Controller::OnEvent(const protocol::Event& event) {
       break;
     case protocol::EventType::kRejected:
       if (event.request_id == 0) return;
+      if (event.code == protocol::StatusCode::kDropped) {
+        // This program has dropped the request itself, for example with its avatar.
+        if (probes_ != nullptr) probes_->Rejected(event.avatar - 1, event.request_id);
+        return;
+      }
       ++counts_.requests_rejected;
       ++counts_.rejected_by_code[event.code];
       if (counts_.requests_accepted > 0) --counts_.requests_accepted;

@@ -271,7 +271,7 @@ export class App {
     world.on('event', (event) => {
       if (event.type === 'removed') pane.ownAvatars.delete(event.avatar);
       this.footprintTool.onEvent(pane, event);
-      if (!this.walkTool.onEvent(pane, event) && event.type === 'rejected') {
+      if (!this.walkTool.onEvent(pane, event) && event.outcome === 'rejected') {
         this.notify(`Avatar ${event.avatar}: ${event.reason}`);
       }
     });

@@ -23,6 +23,7 @@ export const Status = {
   forgotten: 113,
   unexpected_message: 114,
   already_joined: 115,
+  dropped: 116,
   commands_full: 151,
   closed: 152,
   already_connected: 153,

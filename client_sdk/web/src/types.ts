@@ -45,6 +45,17 @@ export type Foot = 'left' | 'right';
  * region, or left the region or the world. */
 export type WorldEventType = 'accepted' | 'started' | 'footStrike' | 'finished' | 'idle' |
     'rejected' | 'spawned' | 'removed' | 'entered' | 'left';
+/**
+ * How a request ended.
+ * - `none`: the event does not end a request.
+ * - `completed`: finished; the movement was played to its end, or the walk has arrived.
+ * - `rejected`: rejected; the avatar could not execute the request.
+ * - `cancelled`: rejected; `World.cancel` dropped it.
+ * - `replaced`: rejected or finished; another request dropped it, or cut its movement short.
+ * - `removed`: rejected; the avatar was removed.
+ */
+export type RequestOutcome =
+    'none' | 'completed' | 'rejected' | 'cancelled' | 'replaced' | 'removed';
 export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | 'endZ' | 'turn' |
     'length' | 'height';
 /**
@@ -439,6 +450,9 @@ export interface WorldEvent {
   /** Accepted walk: the walking speed of the library that is nearest to the requested one. End of a
    * walk: its mean speed without the first and the last steps. 0: unknown. */
   readonly speedMPerS: number;
+  /** How the request ended. Every accepted request has exactly one event in which it is not `none`,
+   * and no event after it. */
+  readonly outcome: RequestOutcome;
 }
 
 /** Tip of a chain of joints, for example of the head or a toe. */

@@ -35,7 +35,8 @@ protocol::EventType TypeToWire(AvatarEventType type) {
     case AvatarEventType::kFootStrike: return protocol::EventType::kFootStrike;
     case AvatarEventType::kFinished: return protocol::EventType::kFinished;
     case AvatarEventType::kIdle: return protocol::EventType::kIdle;
-    case AvatarEventType::kRejected: return protocol::EventType::kRejected;
+    case AvatarEventType::kRejected:
+    case AvatarEventType::kDropped: return protocol::EventType::kRejected;
   }
   return protocol::EventType::kIdle;
 }
@@ -45,6 +46,10 @@ static_assert(static_cast<int>(MovementKind::kStepLeft) ==
               static_cast<int>(protocol::MovementKind::kStepLeft));
 static_assert(static_cast<int>(MovementKind::kStand) ==
               static_cast<int>(protocol::MovementKind::kStand));
+static_assert(static_cast<int>(RequestOutcome::kCompleted) ==
+              static_cast<int>(protocol::RequestOutcome::kCompleted));
+static_assert(static_cast<int>(RequestOutcome::kRemoved) ==
+              static_cast<int>(protocol::RequestOutcome::kRemoved));
 static_assert(static_cast<int>(Foot::kRight) == static_cast<int>(protocol::FootSide::kRight));
 static_assert(kMaxWaypoints == protocol::kMaxWaypoints);
 static_assert(kMaxTerrainColumns == protocol::kMaxTerrainColumns &&
@@ -192,7 +197,11 @@ protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library) {
   wire.foot = static_cast<protocol::FootSide>(event.foot);
   wire.position_m = DVec3(event.position_m);
   wire.base = ToWire(event.base);
-  if (event.type == AvatarEventType::kRejected) {
+  wire.outcome = static_cast<protocol::RequestOutcome>(event.outcome);
+  if (event.type == AvatarEventType::kDropped) {
+    wire.code = protocol::StatusCode::kDropped;
+    wire.reason = event.reason;
+  } else if (event.type == AvatarEventType::kRejected) {
     wire.code = ToStatusCode(event.code);
     wire.reason = DescribeRejection(event);
     if (const auto& missed = event.missed) {

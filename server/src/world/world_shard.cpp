@@ -25,6 +25,10 @@ bool IsSpawnable(const protocol::Placement& start) {
          std::abs(start.heading_rad) <= kMaxSpawnHeadingRad;
 }
 
+// Number of dropped requests that are reported per tick. One command can drop millions, whose
+// events would take gigabytes at once.
+constexpr std::size_t kMaxDroppedPerTick = 16384;
+
 ReplyItem NoSuchAvatar(std::uint32_t index, AvatarId avatar, protocol::RequestId request = 0) {
   return {index, avatar, request, StatusCode::kNoSuchAvatar, "no avatar has this id"};
 }
@@ -58,6 +62,26 @@ protocol::Event& WorldShard::AddEvent(EventType type, AvatarId avatar, std::uint
   return event;
 }
 
+void WorldShard::ReportDropped(AvatarId id, AvatarSimulation& avatar, std::uint64_t tick) {
+  const std::vector<DroppedRequest> dropped = avatar.TakeDropped();
+  if (dropped.empty() || !interest_.events()) return;
+  for (const DroppedRequest& request : dropped) dropped_.push_back({id, request});
+  ReportDropped(tick);
+}
+
+void WorldShard::ReportDropped(std::uint64_t tick) {
+  if (!interest_.events()) dropped_.clear();
+  for (; !dropped_.empty() && dropped_events_left_ > 0; --dropped_events_left_) {
+    const auto& [avatar, request] = dropped_.front();
+    protocol::Event& event = AddEvent(EventType::kRejected, avatar, tick);
+    event.request_id = request.id;
+    event.code = StatusCode::kDropped;
+    event.reason = DropReason(request.outcome);
+    event.outcome = static_cast<protocol::RequestOutcome>(request.outcome);
+    dropped_.pop_front();
+  }
+}
+
 CommandResult WorldShard::Execute(const WorldCommand& command, std::uint64_t tick) {
   CommandResult result;
   result.session = command.session;
@@ -71,7 +95,7 @@ CommandResult WorldShard::Execute(const WorldCommand& command, std::uint64_t tic
         } else if constexpr (std::is_same_v<T, RemovePart>) {
           Remove(part, tick, result);
         } else if constexpr (std::is_same_v<T, CancelPart>) {
-          Cancel(part, result);
+          Cancel(part, tick, result);
         } else if constexpr (std::is_same_v<T, LayerPart>) {
           SetLayers(part, result);
         } else if constexpr (std::is_same_v<T, PlantingPart>) {
@@ -150,6 +174,7 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
       continue;
     }
     ++result.accepted;
+    ReportDropped(asked.avatar, avatar, tick);
     if (interest_.events()) {
       protocol::Event& accepted = AddEvent(EventType::kAccepted, asked.avatar, tick);
       accepted.request_id = asked.request_id;
@@ -167,10 +192,14 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
 
 void WorldShard::Remove(const RemovePart& part, std::uint64_t tick, CommandResult& result) {
   for (const AvatarRef& ref : part.avatars) {
-    if (avatars_.erase(ref.avatar) == 0) {
+    const auto it = avatars_.find(ref.avatar);
+    if (it == avatars_.end()) {
       result.items.push_back(NoSuchAvatar(ref.index, ref.avatar));
       continue;
     }
+    it->second.avatar.DropAll(RequestOutcome::kRemoved);
+    ReportDropped(ref.avatar, it->second.avatar, tick);
+    avatars_.erase(it);
     is_order_valid_ = false;
     ++result.accepted;
     RecordRemoval(ref.avatar);
@@ -179,7 +208,7 @@ void WorldShard::Remove(const RemovePart& part, std::uint64_t tick, CommandResul
   budget_.Release(*world_, result.accepted);
 }
 
-void WorldShard::Cancel(const CancelPart& part, CommandResult& result) {
+void WorldShard::Cancel(const CancelPart& part, std::uint64_t tick, CommandResult& result) {
   for (const AvatarRef& ref : part.avatars) {
     const auto it = avatars_.find(ref.avatar);
     if (it == avatars_.end()) {
@@ -187,6 +216,7 @@ void WorldShard::Cancel(const CancelPart& part, CommandResult& result) {
       continue;
     }
     it->second.avatar.CancelQueue();
+    ReportDropped(ref.avatar, it->second.avatar, tick);
     ++result.accepted;
   }
 }
@@ -241,6 +271,11 @@ void WorldShard::SetPlanting(const PlantingPart& part, CommandResult& result) {
 
 void WorldShard::Release(SessionId session, std::uint64_t tick) {
   if (world_->persistent) return;
+  for (auto& [id, entry] : avatars_) {
+    if (entry.owner != session) continue;
+    entry.avatar.DropAll(RequestOutcome::kRemoved);
+    ReportDropped(id, entry.avatar, tick);
+  }
   const std::size_t removed = std::erase_if(avatars_, [&](const auto& item) {
     if (item.second.owner != session) return false;
     RecordRemoval(item.first);
@@ -262,6 +297,8 @@ void WorldShard::ApplyTerrain(std::uint64_t tick) {
 void WorldShard::Advance(std::uint64_t tick, int steps) {
   STRIDEWIRE_CHECK(steps >= 1 && tick >= tick_);
   tick_ = tick;
+  dropped_events_left_ = kMaxDroppedPerTick;
+  ReportDropped(tick);
   steps_left_ = static_cast<std::uint16_t>(steps);
   // The steps of missed ticks use the terrain of their own time.
   while (steps > 1 && !next_terrains_.empty() && next_terrains_.front().tick <= tick) {

@@ -117,7 +117,7 @@ class WorldShard {
   void Remove(const RemovePart& part, std::uint64_t tick, CommandResult& result);
   void SetLayers(const LayerPart& part, CommandResult& result);
   void SetPlanting(const PlantingPart& part, CommandResult& result);
-  void Cancel(const CancelPart& part, CommandResult& result);
+  void Cancel(const CancelPart& part, std::uint64_t tick, CommandResult& result);
   void Release(SessionId session, std::uint64_t tick);
   void ApplyTerrain(std::uint64_t tick);
   void AdvanceAvatars(std::uint64_t tick, int steps);
@@ -128,6 +128,9 @@ class WorldShard {
   [[nodiscard]] protocol::Movements EmptyMovements() const;
   [[nodiscard]] bool IsFull(const protocol::Movements& message) const;
   protocol::Event& AddEvent(protocol::EventType type, AvatarId avatar, std::uint64_t tick);
+  // Reports the requests that the last call on an avatar has dropped.
+  void ReportDropped(AvatarId id, AvatarSimulation& avatar, std::uint64_t tick);
+  void ReportDropped(std::uint64_t tick);
 
   // world_shard_poses.cpp: poses.
   std::span<const std::uint32_t> SelectedRows(protocol::PoseMode mode);
@@ -159,8 +162,14 @@ class WorldShard {
 
   std::vector<std::uint32_t> eventful_;  // Rows that may have events after the last step.
   std::vector<protocol::Event> events_;
-  std::uint64_t step_ = 0;  // Number of steps since this object was created.
-  std::uint64_t tick_ = 0;  // Tick of the current or last Advance.
+  struct Dropped {
+    AvatarId avatar;
+    DroppedRequest request;
+  };
+  std::deque<Dropped> dropped_;          // Dropped requests that are not reported yet.
+  std::size_t dropped_events_left_ = 0;  // Number of them that may be reported in this tick.
+  std::uint64_t step_ = 0;               // Number of steps since this object was created.
+  std::uint64_t tick_ = 0;               // Tick of the current or last Advance.
   // Number of steps that are left in the current Advance.
   std::uint16_t steps_left_ = 0;
   std::shared_ptr<const WorldTerrain> terrain_;  // Terrain in use; null: flat ground.

@@ -9,7 +9,7 @@
 #define OFFSET(type, field, bytes) \
   _Static_assert(offsetof(type, field) == (bytes), "offset of " #type "." #field)
 
-_Static_assert(STRIDEWIRE_ABI_VERSION == 4, "the numbers below belong to this version");
+_Static_assert(STRIDEWIRE_ABI_VERSION == 5, "the numbers below belong to this version");
 
 #if UINTPTR_MAX == UINT64_MAX
 
@@ -115,7 +115,7 @@ OFFSET(stridewire_parameters, values, 0);
 OFFSET(stridewire_parameters, names, 56);
 OFFSET(stridewire_parameters, count, 63);
 
-SIZE(stridewire_event, 512);
+SIZE(stridewire_event, 520);
 OFFSET(stridewire_event, type, 0);
 OFFSET(stridewire_event, status, 4);
 OFFSET(stridewire_event, command, 8);
@@ -151,6 +151,7 @@ OFFSET(stridewire_event, nearest_height_m, 480);
 OFFSET(stridewire_event, nearest_turn_rad, 488);
 OFFSET(stridewire_event, nearest_heading_rad, 496);
 OFFSET(stridewire_event, speed_m_s, 504);
+OFFSET(stridewire_event, outcome, 512);
 
 SIZE(stridewire_joint, 84);
 OFFSET(stridewire_joint, name, 0);
@@ -239,6 +240,7 @@ SIZE(stridewire_interrupt, 4);
 SIZE(stridewire_pose_mode, 4);
 SIZE(stridewire_pose_detail, 4);
 SIZE(stridewire_event_type, 4);
+SIZE(stridewire_outcome, 4);
 SIZE(stridewire_movement_kind, 4);
 SIZE(stridewire_pose_kind, 4);
 

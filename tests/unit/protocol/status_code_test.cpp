@@ -17,7 +17,7 @@ TEST(StatusCode, HasUniqueNames) {
     EXPECT_TRUE(names.insert(name).second) << name;
     EXPECT_TRUE(number == 0 || (number >= 100 && number < 500)) << number;
   }
-  EXPECT_EQ(known, 26);
+  EXPECT_EQ(known, 27);
   EXPECT_EQ(StatusCodeName(StatusCode::kNoSuchAvatar), "no_such_avatar");
 }
 

@@ -50,7 +50,7 @@ extern "C" {
 #endif
 
 /// Version of the struct layouts in this header. stridewire_client_create rejects other versions.
-#define STRIDEWIRE_ABI_VERSION 4
+#define STRIDEWIRE_ABI_VERSION 5
 
 /// Returns the version of the library, for example "0.1.0".
 const char* stridewire_version(void);
@@ -261,7 +261,8 @@ typedef struct stridewire_movement {
 /// Requests movements. An avatar may appear several times and executes its movements in order.
 /// Steps of a walk appear in events with the request id of the walk. A walk ends with FINISHED of
 /// kind STAND when the avatar has arrived, or with REJECTED if it cannot continue. Steps and jumps
-/// that are out of reach end with REJECTED, which contains the nearest one in reach.
+/// that are out of reach end with REJECTED, which contains the nearest one in reach. So do requests
+/// that are cancelled, replaced, or whose avatar is removed, see `outcome` of stridewire_event.
 ///
 /// If the library cannot walk at a requested speed, REPLY has the status OK and a `text` that
 /// states the possible speeds, and ACCEPTED has `clamped` and the nearest of them.
@@ -269,7 +270,8 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
                                             const stridewire_movement* movements, size_t count,
                                             uint64_t* command);
 
-/// Drops all requested movements of these avatars that have not started.
+/// Drops all requested movements of these avatars that have not started. Walks in progress end
+/// after their current step.
 stridewire_status stridewire_client_cancel(stridewire_client* client, stridewire_world world,
                                            const uint32_t* avatars, size_t count,
                                            uint64_t* command);
@@ -453,13 +455,14 @@ typedef enum stridewire_event_type {
   /// started.
   STRIDEWIRE_EVENT_STARTED = 33,
   STRIDEWIRE_EVENT_FOOT_STRIKE = 34,  ///< Uses foot, position_m. A foot has landed.
-  /// Uses request_id, kind, base, cut_short, and at the end of a walk also speed_m_s. A movement
-  /// has ended. `base` is the new base frame.
+  /// Uses request_id, kind, base, cut_short, outcome, and at the end of a walk also speed_m_s. A
+  /// movement has ended. `base` is the new base frame.
   STRIDEWIRE_EVENT_FINISHED = 35,
   STRIDEWIRE_EVENT_IDLE = 36,  ///< Uses base. The avatar stands and its queue is empty.
-  /// Uses request_id, status, text. The avatar could not execute a queued request. If a step or
-  /// jump is out of reach (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point in
-  /// reach), missed_m, missed_rad and nearest_*. At the end of a walk, also uses speed_m_s.
+  /// Uses request_id, status, text, outcome. The avatar could not execute a queued request, or the
+  /// request was dropped before it was completed (DROPPED). If a step or jump is out of reach
+  /// (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point in reach), missed_m,
+  /// missed_rad and nearest_*. At the end of a walk, also uses speed_m_s.
   STRIDEWIRE_EVENT_REJECTED = 37,
   STRIDEWIRE_EVENT_SPAWNED = 38,  ///< base
   STRIDEWIRE_EVENT_REMOVED = 39,
@@ -483,6 +486,20 @@ typedef struct stridewire_parameters {
   uint8_t names[STRIDEWIRE_MAX_PARAMETERS];
   uint8_t count;  ///< Number of valid entries in `values` and `names`.
 } stridewire_parameters;
+
+/// How a requested movement ended.
+typedef enum stridewire_outcome {
+  STRIDEWIRE_OUTCOME_NONE = 0,  ///< The event does not end a request.
+  /// FINISHED: the movement was played to its end, or the walk has arrived.
+  STRIDEWIRE_OUTCOME_COMPLETED = 1,
+  STRIDEWIRE_OUTCOME_REJECTED = 2,  ///< REJECTED: the avatar could not execute the request.
+  /// REJECTED: stridewire_client_cancel dropped the request.
+  STRIDEWIRE_OUTCOME_CANCELLED = 3,
+  /// REJECTED or FINISHED: a request with an interrupt dropped this one, or cut its movement short.
+  STRIDEWIRE_OUTCOME_REPLACED = 4,
+  STRIDEWIRE_OUTCOME_REMOVED = 5,  ///< REJECTED: the avatar was removed.
+  STRIDEWIRE_OUTCOME_MAX = 0x7fffffff
+} stridewire_outcome;
 
 /// An event. Fields that its type does not use are 0.
 typedef struct stridewire_event {
@@ -528,6 +545,10 @@ typedef struct stridewire_event {
   /// ACCEPTED: the walking speed of the library that is nearest to the requested one. End of a
   /// walk: its mean speed without the first and the last steps. 0: unknown.
   double speed_m_s;
+  /// How the request ended. Every request that the server has accepted has exactly one event in
+  /// which it is not NONE, and no event after it. Exceptions are a lost session, and events that a
+  /// client that reads too slowly loses (LAGGING, `events_dropped_before`).
+  stridewire_outcome outcome;
 } stridewire_event;
 
 /// Moves up to `capacity` of the oldest events from the queue to `events`. `count` receives the

@@ -13,7 +13,7 @@ const enumerators = new Set([
   'reduced', 'root', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto',
   'left', 'right', 'stepLeft', 'stepRight', 'accepted', 'started', 'footStrike', 'finished',
   'idle', 'rejected', 'spawned', 'removed', 'entered', 'startX', 'startY', 'startZ', 'endX',
-  'endY', 'endZ', 'turn', 'length', 'height',
+  'endY', 'endZ', 'turn', 'length', 'height', 'completed', 'cancelled', 'replaced',
 ]);
 /** Text fields that are not enumerators. */
 const freeTexts = new Set([

@@ -217,7 +217,7 @@ export function toJson(m: Message, frame: ArrayBuffer): {[name: string]: Json} {
             missed_m: e.missedM, missed_rad: e.missedRad, nearest_length_m: e.nearestLengthM,
             nearest_side_m: e.nearestSideM, nearest_height_m: e.nearestHeightM,
             nearest_turn_rad: e.nearestTurnRad, nearest_heading_rad: e.nearestHeadingRad,
-            speed_m_s: e.speedMPerS,
+            speed_m_s: e.speedMPerS, outcome: enums.RequestOutcome.indexOf(e.outcome),
           }),
         })),
       };

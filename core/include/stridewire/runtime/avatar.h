@@ -22,6 +22,24 @@ enum class AvatarEventType : std::uint8_t {
   /// A request could not be carried out: code and reason, and for a step or jump that is out of
   /// reach the nearest one. The requests queued after it are played.
   kRejected,
+  kDropped,  ///< A request was cancelled, replaced or removed: outcome and reason.
+};
+
+/// How a request ended.
+enum class RequestOutcome : std::uint8_t {
+  kNone,       ///< The request has not ended.
+  kCompleted,  ///< kFinished: the movement was played to its end, or the walk has arrived.
+  kRejected,   ///< kRejected: the avatar could not carry it out.
+  kCancelled,  ///< kDropped: CancelQueue or Teleport dropped it.
+  /// kDropped or kFinished: a request with an interrupt dropped it or cut its movement short.
+  kReplaced,
+  kRemoved,  ///< kDropped: the avatar was removed.
+};
+
+/// A request that was dropped before it was completed.
+struct DroppedRequest {
+  std::uint64_t id = 0;
+  RequestOutcome outcome = RequestOutcome::kNone;
 };
 
 /// A step or jump in terms of StepRequest or JumpRequest.
@@ -65,20 +83,23 @@ struct AvatarEvent {
   Vec3 position_m = Vec3(0.0f);  ///< kFootStrike: ball of that foot, in the world.
   BaseFrame base;                ///< kFinished: base frame after the movement.
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
-  /// In static storage. kRejected: reason as one sentence. kIdle, and kStarted of a stand: the
-  /// reason why the feet are still apart; empty if they are together.
+  /// In static storage. kRejected, kDropped: one sentence. kIdle, kStarted of a stand: the reason
+  /// why the feet are still apart; empty if they are together.
   const char* reason = "";
   /// kRejected: set if the request was a step or jump that is out of reach.
   std::optional<FootprintError> missed;
   /// End of a walk (kFinished or kRejected): its mean speed without the first three and the last
   /// two steps. 0 if the walk had fewer than six steps.
   double speed_m_s = 0.0;
+  /// How the request ended. Every accepted request has exactly one event in which it is not kNone.
+  /// This is the last event with the id of the request.
+  RequestOutcome outcome = RequestOutcome::kNone;
 };
 
-/// Describes a kRejected event in one sentence of at most 200 bytes, for example "the footprint is
-/// out of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off",
-/// or "the step is out of reach: requested length 1 m; nearest length 0.66 m, 0.34 m and 0 degrees
-/// off".
+/// Describes a kRejected or kDropped event in one sentence of at most 200 bytes, for example "the
+/// footprint is out of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5
+/// degrees off", or "the step is out of reach: requested length 1 m; nearest length 0.66 m, 0.34 m
+/// and 0 degrees off".
 [[nodiscard]] std::string DescribeRejection(const AvatarEvent& event);
 
 /// Methods to continue smoothly from the previously displayed pose when a movement begins.
@@ -124,6 +145,7 @@ class AvatarSimulation;
 class Avatar {
  public:
   static constexpr int kMaxQueue = 1024;
+  /// Number of events of an Advance, without those of requests that were dropped before it.
   static constexpr std::size_t kMaxEventsPerAdvance = 16;
 
   /// Creates an avatar that stands at `start` in the library's stand pose. `library` must not be
@@ -140,7 +162,8 @@ class Avatar {
   /// not planted; kLimitExceeded: the queue holds kMaxQueue requests.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
-  /// Drops the requests that have not started and returns their number.
+  /// Drops the requests that have not started and returns their number. A walk in progress counts
+  /// as one of them and ends with its current step. The next Advance reports the dropped requests.
   int CancelQueue();
 
   /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not
@@ -148,7 +171,8 @@ class Avatar {
   /// layers are already playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
-  /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.
+  /// Moves the avatar to `start` at once, standing. Drops the current movement and the queue, and
+  /// keeps the layers.
   void Teleport(const BaseFrame& start);
 
   /// Enables or disables foot planting for the movements that start from now on. Fails with

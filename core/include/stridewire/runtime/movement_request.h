@@ -68,7 +68,8 @@ struct StandRequest {
 
 /// Requests a walk to a place, with as many steps as necessary (walk_planner.h). Events of its
 /// steps have the id of the request. On arrival a kFinished event of kind kStand with this id
-/// follows; if the walk fails, a kRejected event with the reason.
+/// follows; if the walk fails, a kRejected event with the reason; if it is dropped in progress, a
+/// kDropped event after its current step.
 struct WalkRequest {
   DVec3 position_m = DVec3(0.0);   ///< Base frame at the end. y is ignored; the ground sets it.
   double heading_rad = 0.0;        ///< Heading of the base frame at the end.

@@ -184,7 +184,9 @@ bool AvatarSimulation::Redirect(PlanScratch& scratch) {
   may_redirect_ = false;
   if (!redirection) return false;
   const MovementRequest& request = redirection->request;
-  if (std::holds_alternative<StepRequest>(queue_[queue_head_].movement)) CancelQueue();
+  const auto& head = queue_[queue_head_].movement;
+  const bool is_walk = std::holds_alternative<WalkRequest>(head);
+  if (std::holds_alternative<StepRequest>(head)) PopQueue();
   if (redirection->ends_interrupt) interrupts_ = false;
   CaptureBlendSource(movement_time_s_);
   const AvatarEvent left{.type = AvatarEventType::kFinished,
@@ -192,7 +194,8 @@ bool AvatarSimulation::Redirect(PlanScratch& scratch) {
                          .kind = group().kind,
                          .group = body_.movement.group,
                          .is_cut_short = true,
-                         .base = base_};
+                         .base = base_,
+                         .outcome = MovementOutcome(true)};
   const AvatarChange before = change_;
   RecordLeaving(movement_time_s_, true);
   if (!PlanRequested(request, redirection->plan, phase, scratch)) {
@@ -200,7 +203,9 @@ bool AvatarSimulation::Redirect(PlanScratch& scratch) {
     return true;
   }
   AddEvent(left);
+  EndDroppedWalk();
   BeginMovement(redirection->plan, request.id);
+  is_walk_step_ = is_walk;
   if (redirection->is_inserted) inserted_steps_ = 1;
   return true;
 }

@@ -17,13 +17,11 @@ namespace stridewire {
 namespace {
 
 // A movement can add up to this many events in one tick: started, two foot strikes, finished, the
-// end of a walk or a rejection, and the start of the next movement.
+// end of a dropped walk, the end of a walk or a rejection, and the start of the next movement.
 constexpr std::size_t kEventReserve = 7;
 // A tick usually has at most three events: finished, started and foot strike. The list grows if
 // there are more.
 constexpr std::size_t kUsualEvents = 3;
-// A queue keeps memory for this many requests.
-constexpr std::size_t kUsualQueue = 8;
 // Phase at which a jump starts if it interrupts another movement. In between, the blend from the
 // previous pose replaces the start of the crouch.
 constexpr double kJumpStartPhase = 0.25;
@@ -40,6 +38,7 @@ AvatarSimulation::AvatarSimulation(std::shared_ptr<const MotionLibrary> library,
 }
 
 void AvatarSimulation::Teleport(const BaseFrame& start) {
+  DropAll(RequestOutcome::kCancelled);
   base_ = start;
   ++revision_;
   const Pose& stand = body_.library->stand_pose();
@@ -65,55 +64,9 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
   feet_ = stand_feet_;
   last_group_ = body_.library->groups().size();
   last_moved_ = Foot::kRight;
-  CancelQueue();
   STRIDEWIRE_CHECK(idle());
   body_.ApplyLayers();
   next_change_.needs_state = true;
-}
-
-Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_delay_s) {
-  STRIDEWIRE_CHECK(start_delay_s >= 0.0);
-  if (Status status = ValidateRequest(*body_.library, request); !status) return status;
-  if (queue_size() >= kMaxQueue) {
-    return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
-  }
-  if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->exact_only) {
-    if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNeedsPlanting);
-    if (saved_.empty()) {
-      saved_.resize(1);
-      saved_.front().pose = Pose(body_.library->skeleton().joint_count());
-      Reserve(*body_.library, saved_.front().movement);
-      // A single tick may reject many requests, so the list must be able to grow.
-      events_.reserve(kMaxEventsPerAdvance);
-    }
-  }
-  const double earlier_start_s = start_not_before_s_;
-  if (request.interrupt != Interrupt::kNone) {
-    CancelQueue();
-    next_event_s_ = -1.0;
-    interrupts_ = may_redirect_ = request.interrupt == Interrupt::kNow && is_moving_;
-    if (is_in_stand_) stand_left_s_ = 0.0;
-  }
-  if (!is_moving_) next_event_s_ = -1.0;
-  if (queue_size() == 0) {
-    start_not_before_s_ = time_s_ + start_delay_s;
-    if (earlier_start_s > time_s_)
-      start_not_before_s_ = std::min(start_not_before_s_, earlier_start_s);
-  }
-  if (queue_head_ >= 4 && queue_head_ * 2 > queue_.size()) {
-    queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
-    queue_head_ = 0;
-  }
-  // Grow the queue in small steps and release its memory when it is empty. The queues of a whole
-  // crowd tend to be long at the same time, but only briefly.
-  if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
-  if (queue_.size() == queue_.capacity()) {
-    queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
-  }
-  queue_.push_back(request);
-  STRIDEWIRE_CHECK(queue_size() >= 1 && queue_size() <= kMaxQueue);
-  STRIDEWIRE_CHECK(start_not_before_s_ >= 0.0);
-  return {};
 }
 
 Status AvatarSimulation::SetLayer(const LayerRequest& request) {
@@ -132,23 +85,15 @@ Status AvatarSimulation::SetFootPlanting(bool enabled) {
   return {};
 }
 
-int AvatarSimulation::CancelQueue() {
-  const int dropped = queue_size();
-  queue_.clear();
-  queue_head_ = 0;
-  walk_ = {};
-  walk_pace_ = {};
-  interrupts_ = may_redirect_ = false;
-  start_not_before_s_ = 0.0;
-  return dropped;
-}
-
 void AvatarSimulation::AddEvent(const AvatarEvent& event) {
-  STRIDEWIRE_CHECK(events_.size() < kMaxEventsPerAdvance);
+  STRIDEWIRE_CHECK(events_.size() < max_events_);
   STRIDEWIRE_CHECK(events_.empty() || events_.back().time_s <= time_s_);
-  events_.push_back(event);
-  events_.back().time_s = time_s_;
-  if (event.type == AvatarEventType::kStarted) started_ = events_.back();
+  AvatarEvent& added = events_.emplace_back(event);
+  added.time_s = time_s_;
+  if (event.type == AvatarEventType::kStarted) started_ = added;
+  if (event.type == AvatarEventType::kRejected && event.outcome == RequestOutcome::kNone) {
+    added.outcome = RequestOutcome::kRejected;
+  }
 }
 
 FootState AvatarSimulation::MeasureFeet() const {
@@ -246,6 +191,7 @@ double AvatarSimulation::NextEventTime() const {
 
 void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   events_.clear();
+  AddDroppedEvents();
   change_ = std::exchange(next_change_, {});
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
@@ -254,7 +200,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     STRIDEWIRE_CHECK(!(is_moving_ && is_in_stand_));
     // Movements that are shorter than a tick could overflow the event list. Once the list is nearly
     // full, nothing more starts or ends in this tick.
-    const bool may_change = events_.size() + kEventReserve <= kMaxEventsPerAdvance;
+    const bool may_change = events_.size() + kEventReserve <= max_events_;
     if (is_moving_) {
       const double before_s = movement_time_s_;
       if (may_change && Redirect(scratch)) continue;
@@ -325,6 +271,7 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   }
   if (stand != nullptr) {
     is_in_stand_ = true;
+    is_walk_step_ = is_stand_cut_short_ = false;
     stand_left_s_ = stand->seconds;
     request_id_ = PopQueue();
     AddEvent({.type = AvatarEventType::kStarted,
@@ -376,14 +323,6 @@ void AvatarSimulation::StartInserted(const RequestPlan& plan, PlanScratch& scrat
   inserted_steps_ = inserted;
 }
 
-// Removes the request at the head of the queue and returns its id.
-std::uint64_t AvatarSimulation::PopQueue() {
-  STRIDEWIRE_CHECK(queue_head_ < queue_.size());
-  const std::uint64_t id = queue_[queue_head_++].id;
-  if (queue_size() == 0) CancelQueue();
-  return id;
-}
-
 // Plans the next step of the walk at the head of the queue, from where the feet stood when the last
 // step ended.
 WalkDecision AvatarSimulation::PlanNextWalkStep(WalkProgress& progress) const {
@@ -410,6 +349,7 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
   const WalkDecision decision = PlanNextWalkStep(walk_);
   if (decision.outcome == WalkOutcome::kStep) {
     StartPlan(decision.plan, queue_[queue_head_].id, scratch);
+    is_walk_step_ = true;
     return;
   }
   const double speed_m_s = walk_pace_.mean_m_s();  // PopQueue may reset it.
@@ -420,7 +360,8 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
     AddEvent({.type = AvatarEventType::kFinished,
               .request_id = id,
               .base = base_,
-              .speed_m_s = speed_m_s});
+              .speed_m_s = speed_m_s,
+              .outcome = RequestOutcome::kCompleted});
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = id,
@@ -554,6 +495,7 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
   is_settled_ = false;
   body_.begins_planting = false;
   is_exact_ = plan.exact.has_value();
+  is_walk_step_ = false;
   inserted_steps_ = 0;
   is_idle_reported_ = false;
   movement_time_s_ = body_.movement.start_offset_s;
@@ -622,14 +564,20 @@ void AvatarSimulation::FinishMovement(double at_s) {
             .kind = finished.kind,
             .group = body_.movement.group,
             .is_cut_short = at_s < body_.movement.duration_s(),
-            .base = base_});
+            .base = base_,
+            .outcome = MovementOutcome(at_s < body_.movement.duration_s())});
+  EndDroppedWalk();
 }
 
 void AvatarSimulation::FinishStand() {
   STRIDEWIRE_CHECK(is_in_stand_ && !is_moving_);
   is_in_stand_ = false;
   last_group_ = body_.library->groups().size();
-  AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});
+  AddEvent({.type = AvatarEventType::kFinished,
+            .request_id = request_id_,
+            .is_cut_short = is_stand_cut_short_,
+            .base = base_,
+            .outcome = MovementOutcome(is_stand_cut_short_)});
 }
 
 Vec3 AvatarSimulation::LandingBall(Foot foot) const {

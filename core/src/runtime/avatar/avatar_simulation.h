@@ -45,12 +45,15 @@ struct AvatarChange {
   bool operator==(const AvatarChange&) const = default;
 };
 
+/// Returns the reason that a kDropped event states, as a sentence without its full stop.
+[[nodiscard]] const char* DropReason(RequestOutcome outcome);
+
 /// Simulates one avatar: base frame, queue of requests, current movement, displayed pose.
 ///
 /// Time is an argument; only Advance moves the avatar. The same library, start, requests and time
 /// steps give the same pose bytes on every machine. Not thread-safe; one owner. After construction
-/// only these allocate: Enqueue, for a queue of up to kMaxQueue requests; SetLayer; the first
-/// Advance; and an Advance with more events than any before.
+/// only these allocate: Enqueue, for a queue of up to kMaxQueue requests; calls that drop requests;
+/// SetLayer; the first Advance; and an Advance with more events than any before.
 class AvatarSimulation {
  public:
   static constexpr int kMaxQueue = Avatar::kMaxQueue;
@@ -74,14 +77,23 @@ class AvatarSimulation {
   [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
 
   /// Drops the requests that have not started and returns their number. The current movement
-  /// continues to its end.
+  /// continues to its end. A walk in progress is dropped after its current step.
   int CancelQueue();
+
+  /// Drops the current movement's request and the queue, because the avatar is about to be removed
+  /// or moved. The caller must then do that.
+  void DropAll(RequestOutcome outcome);
+
+  /// Returns the requests that were dropped since the last Advance, and does not report them in
+  /// events(). Those that are not taken become events of the next Advance.
+  [[nodiscard]] std::vector<DroppedRequest> TakeDropped() { return std::exchange(dropped_, {}); }
 
   /// Starts, changes or ends a layer with the next Advance. The legs and the root keep exactly the
   /// bits they have without layers. Errors are those of LayerStack::Set.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
-  /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.
+  /// Moves the avatar to `start` at once, standing. Drops the current movement and the queue, and
+  /// keeps the layers.
   void Teleport(const BaseFrame& start);
 
   /// Enables or disables foot planting, without a visible jump, from the next movement on. Until
@@ -191,6 +203,19 @@ class AvatarSimulation {
   };
 
   void AddEvent(const AvatarEvent& event);
+  void AddDroppedEvents();
+  void DropQueue(RequestOutcome outcome);
+  void ClearQueue();
+  void EndDroppedWalk();
+  // True if the current movement is a step of the walk at the head of the queue.
+  [[nodiscard]] bool IsWalkInProgress() const {
+    return is_moving_ && is_walk_step_ && walk_outcome_ == RequestOutcome::kNone;
+  }
+  // Returns how the request of the current movement ends when the movement does.
+  [[nodiscard]] RequestOutcome MovementOutcome(bool is_cut_short) const {
+    if (is_walk_step_ || request_id_ == 0) return RequestOutcome::kNone;
+    return is_cut_short ? RequestOutcome::kReplaced : RequestOutcome::kCompleted;
+  }
   // Time is a sum of ticks, so rounding must not make a delay of whole ticks one tick longer.
   [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
   [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
@@ -270,7 +295,11 @@ class AvatarSimulation {
   bool interrupts_ = false;
   // True until the avatar has tried to redirect the current step for that request.
   bool may_redirect_ = false;
-  bool is_exact_ = false;  // True if the current step goes to a requested footprint.
+  bool is_exact_ = false;      // True if the current step goes to a requested footprint.
+  bool is_walk_step_ = false;  // True if the current or last movement is a step of a walk.
+  // Outcome of that walk if it was dropped. It is reported when the step has ended.
+  RequestOutcome walk_outcome_ = RequestOutcome::kNone;
+  bool is_stand_cut_short_ = false;  // True if a request has ended the current stand.
   // Number of steps that were inserted in a row, including the current movement.
   int inserted_steps_ = 0;
   std::uint64_t movement_number_ = 0;  // Number of movements that have begun.
@@ -308,6 +337,8 @@ class AvatarSimulation {
   std::vector<MovementRequest> queue_;
   std::size_t queue_head_ = 0;
   std::vector<AvatarEvent> events_;
+  std::size_t max_events_ = kMaxEventsPerAdvance;  // Limit of events_ in this Advance.
+  std::vector<DroppedRequest> dropped_;            // Dropped since the last Advance.
   OwnScratch own_scratch_;
 };
 

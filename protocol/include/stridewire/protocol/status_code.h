@@ -28,6 +28,8 @@ enum class StatusCode : std::uint16_t {
   kForgotten = 113,
   kUnexpectedMessage = 114,  ///< The state of the session does not allow the message.
   kAlreadyJoined = 115,
+  /// The request was cancelled or replaced, or its avatar was removed.
+  kDropped = 116,
   // Codes 200 to 299: the data is invalid.
   kMalformed = 200,   ///< The bytes violate the standard.
   kNoMovement = 201,  ///< The library has no such movement or layer.
