@@ -31,6 +31,18 @@ bool IsMovement(const stridewire_movement& m) {
          (m.allow_nearest == 0 || m.type == STRIDEWIRE_STEP || m.type == STRIDEWIRE_JUMP);
 }
 
+protocol::Spawn ToSpawn(std::span<const stridewire_spawn> spawns, bool teleport) {
+  protocol::Spawn message;
+  message.items.reserve(spawns.size());
+  for (const stridewire_spawn& s : spawns) {
+    message.items.push_back(
+        {s.avatar,
+         {DVec3(s.position_m[0], s.position_m[1], s.position_m[2]), s.heading_rad},
+         teleport});
+  }
+  return message;
+}
+
 decltype(protocol::RequestItem::movement) ToMovement(const stridewire_movement& m) {
   switch (m.type) {
     case STRIDEWIRE_STEP: {
@@ -165,13 +177,19 @@ stridewire_status stridewire_client_spawn(stridewire_client* client, stridewire_
                                           uint64_t* command) {
   if (!IsList(spawns, count)) return STRIDEWIRE_INVALID_ARGUMENT;
   return Submit(client, command, [&](Session& session, std::uint64_t& id) {
-    protocol::Spawn message;
-    message.items.reserve(count);
-    for (const stridewire_spawn& s : std::span(spawns, count)) {
-      message.items.push_back(
-          {s.avatar, {DVec3(s.position_m[0], s.position_m[1], s.position_m[2]), s.heading_rad}});
-    }
-    return session.Spawn(world, std::move(message), id);
+    return session.Spawn(world, ToSpawn({spawns, count}, false), id);
+  });
+}
+
+stridewire_status stridewire_client_teleport(stridewire_client* client, stridewire_world world,
+                                             const stridewire_spawn* places, size_t count,
+                                             uint64_t* command) {
+  if (!IsList(places, count)) return STRIDEWIRE_INVALID_ARGUMENT;
+  for (const stridewire_spawn& place : std::span(places, count)) {
+    if (place.avatar == 0) return STRIDEWIRE_INVALID_ARGUMENT;
+  }
+  return Submit(client, command, [&](Session& session, std::uint64_t& id) {
+    return session.Spawn(world, ToSpawn({places, count}, true), id);
   });
 }
 

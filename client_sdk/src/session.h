@@ -81,6 +81,7 @@ class Session : public SessionCommands {
   /// Rejects messages that a server must not send.
   void Handle(const Message& message, double now_s);
 
+  [[nodiscard]] static bool IsExpected(const Command& command, const protocol::ReplyItem& item);
   void OnJoinReply(World& world, const protocol::Reply& reply, double now_s);
   void OnSpawnReply(World& world, const protocol::Spawn& spawn, const protocol::Reply& reply);
   void OnRemoveReply(World& world, const protocol::Remove& remove, const protocol::Reply& reply);

@@ -212,10 +212,7 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
   for (const protocol::ReplyItem& item : message.items) {
     const bool chosen = spawn != nullptr && item.index < spawn->items.size() &&
                         spawn->items[item.index].avatar == 0;
-    // An avatar that the session spawns again may still exist, because the world outlives the
-    // session.
-    const bool exists = command.own && item.code == protocol::StatusCode::kAvatarExists;
-    if ((item.code == protocol::StatusCode::kOk && !chosen) || exists) continue;
+    if ((item.code == protocol::StatusCode::kOk && !chosen) || IsExpected(command, item)) continue;
     if (!options_.detailed_events && !command.own) continue;
     stridewire_event event =
         MakeEvent(STRIDEWIRE_EVENT_ITEM, command.world, ToStatus(item.code), item.text);
@@ -235,8 +232,21 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
     // The subscription has already ended, which is the requested state.
     if (status == STRIDEWIRE_NO_SUCH_SUBSCRIPTION) status = STRIDEWIRE_OK;
   }
-  Answer(command, status, message.text, message.accepted);
+  // An item that failed must not be overlooked.
+  std::string text = message.text;
+  for (const protocol::ReplyItem& item : message.items) {
+    if (status != STRIDEWIRE_OK) break;
+    if (item.code == protocol::StatusCode::kOk || IsExpected(command, item)) continue;
+    status = ToStatus(item.code);
+    text = "item " + std::to_string(item.index) + ": " + item.text;
+  }
+  Answer(command, status, text, message.accepted);
   if (std::holds_alternative<protocol::LeaveWorld>(command.message)) worlds_.erase(command.world);
+}
+
+// An avatar that the session spawns again may still exist, because the world outlives the session.
+bool Session::IsExpected(const Command& command, const protocol::ReplyItem& item) {
+  return command.own && item.code == protocol::StatusCode::kAvatarExists;
 }
 
 void Session::OnJoinReply(World& world, const protocol::Reply& reply, double now_s) {
@@ -288,8 +298,16 @@ void Session::OnSpawnReply(World& world, const protocol::Spawn& spawn,
   if (reply.code != protocol::StatusCode::kOk) return;
   for (const protocol::ReplyItem& item : reply.items) {
     if (item.code != protocol::StatusCode::kOk || item.index >= spawn.items.size()) continue;
+    const protocol::SpawnItem& placed = spawn.items[item.index];
+    if (placed.teleport) {
+      // The avatar may belong to another session.
+      if (const auto ours = world.spawned.find(item.avatar); ours != world.spawned.end()) {
+        ours->second = placed.start;
+      }
+      continue;
+    }
     if (world.spawned.size() >= protocol::kMaxItems) break;
-    world.spawned.try_emplace(item.avatar, spawn.items[item.index].start);
+    world.spawned.try_emplace(item.avatar, placed.start);
   }
 }
 

@@ -122,7 +122,7 @@ export class AvatarCommands {
     ++this.recentToggles;
     const commands = avatars.map((avatar) => ({avatar, layer, enabled: !off}));
     void world.setLayers(commands).then((reply) => {
-      if (!reply.ok || reply.accepted === 0) {
+      if (reply.accepted === 0) {
         this.notifyRefused(reply);
         return;
       }
@@ -164,7 +164,7 @@ export class AvatarCommands {
     this.host.goLive();
     ++this.recentToggles;
     void world.setPlanting(avatars, on).then((reply) => {
-      if (!reply.ok || reply.accepted === 0) {
+      if (reply.accepted === 0) {
         this.notifyRefused(reply);
         return;
       }
@@ -222,15 +222,14 @@ export class AvatarCommands {
       });
     }
     const reply = await pane.world.spawn(items);
-    if (!reply.ok) {
-      this.host.notify(`Refused: ${reply.items.find((item) => item.text)?.text || reply.text}`);
-      return;
-    }
-    for (const item of reply.items) pane.ownAvatars.add(item.avatar);
+    if (!reply.ok) this.host.notify(`Refused: ${reply.text}`);
+    if (reply.accepted === 0) return;
+    const spawned = reply.items.filter(({code}) => code === 0);
+    for (const item of spawned) pane.ownAvatars.add(item.avatar);
     if (walkRandomly) {
       const walkers = this.randomWalkersOf(pane);
-      reply.items.forEach((item, i) => {
-        const {positionM, headingRad} = items[i]!;
+      spawned.forEach((item) => {
+        const {positionM, headingRad} = items[item.index]!;
         walkers.add(item.avatar, positionM[0], positionM[2], headingRad);
       });
       this.host.frameAllAvatars();

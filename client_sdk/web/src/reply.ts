@@ -5,15 +5,17 @@ import type {Reply as ReplyMessage} from '../generated/messages';
 
 /** Makes a reply from a status, and from the message of the server if there is one. */
 export function makeReply(code: number, text: string, message?: ReplyMessage): Reply {
+  const items = (message?.items ?? []).map((item) => ({
+    ...item, status: statusName(item.code), text: item.text || statusText(item.code)
+  }));
   return {
     ok: code === 0,
     code,
     status: statusName(code),
-    text: text || statusText(code),
+    // If only items were refused, the session has taken the status of the first of them.
+    text: text || items.find((item) => item.code === code)?.text || statusText(code),
     accepted: message?.accepted ?? 0,
-    items: (message?.items ?? []).map((item) => ({
-      ...item, status: statusName(item.code), text: item.text || statusText(item.code)
-    })),
+    items,
   };
 }
 

@@ -50,7 +50,7 @@ export type WorldEventType = 'accepted' | 'started' | 'footStrike' | 'finished' 
  * - `none`: the event does not end a request.
  * - `completed`: finished; the movement was played to its end, or the walk has arrived.
  * - `rejected`: rejected; the avatar could not execute the request.
- * - `cancelled`: rejected; `World.cancel` dropped it.
+ * - `cancelled`: rejected; `World.cancel` or a teleport dropped it.
  * - `replaced`: rejected or finished; another request dropped it, or cut its movement short.
  * - `removed`: rejected; the avatar was removed.
  */
@@ -77,10 +77,11 @@ export type Parameters = {readonly [name in ParameterName]?: number};
 
 /** Result of a command. Commands never throw, and their promises are never rejected. */
 export interface Reply {
-  /** True if the command was carried out. Single items may still have failed, see `items`. */
+  /** True if the command and all of its items were carried out. */
   readonly ok: boolean;
   /**
    * Status code, one of `Status`; 0 if ok. 1xx: the caller, 2xx: data, 3xx: network, 4xx: server.
+   * If only some items failed, the code of the first of them; `accepted` counts the others.
    */
   readonly code: number;
   /** Name of the code, for example `no_such_avatar`. */
@@ -151,6 +152,9 @@ export interface SpawnItem {
   /** World position of the avatar's base frame. */
   positionM: Vec3;
   headingRad: number;
+  /** True moves an existing avatar there at once, instead of creating one. It drops its movements
+   * and requests, and stands. Needs `avatar`. Default false. */
+  teleport?: boolean;
 }
 
 /**

@@ -118,7 +118,8 @@ test('restores worlds, subscriptions and avatars after a lost session', async ()
   assert.deepEqual(summary(anew), ['Observe 2', 'Spawn 3', 'CancelQueue 4']);
   const spawn = anew[1]!;
   assert.ok(spawn.type === 'Spawn' && spawn.world === 4);
-  assert.deepEqual(spawn.items, [{avatar: 41, positionM: [5, 0, 6], headingRad: 0}]);
+  assert.deepEqual(spawn.items, [
+    {avatar: 41, positionM: [5, 0, 6], headingRad: 0, teleport: false}]);
   // The server lost the session but not the world, so the avatar may still exist.
   h.receive(server.reply(2n), server.reply(3n, 0, [{index: 0, avatar: 41, code: 109}]),
             server.reply(4n));
@@ -127,6 +128,32 @@ test('restores worlds, subscriptions and avatars after a lost session', async ()
   // Ticks of the new session may start again from a smaller number.
   h.receive(server.poseBatch({world: 4, tick: 3}, [{avatar: 41, x: 2}]));
   assert.deepEqual([...world.avatars()], [41]);
+});
+
+test('a reply is not ok if an item was refused', async () => {
+  const h = new Harness({respawn: true});
+  const world = h.joined();
+  const place = {positionM: [1, 0, 2] as const, headingRad: 0};
+  const spawned = world.spawn([{...place, avatar: 7}, {...place, avatar: 8}]);
+  h.sent();
+  h.receive(server.reply(3n, 0, [
+    {index: 0, avatar: 7}, {index: 1, avatar: 8, code: 109}], '', 1));
+  const reply = await spawned;
+  assert.deepEqual([reply.ok, reply.status, reply.accepted], [false, 'avatar_exists', 1]);
+  assert.notEqual(reply.text, '');
+  // A teleport changes where the avatar is spawned again.
+  void world.spawn([{avatar: 7, positionM: [9, 0, 8], headingRad: 1, teleport: true}]);
+  const [sent] = h.sent();
+  assert.ok(sent?.type === 'Spawn' && sent.items[0]!.teleport);
+  h.receive(server.reply(4n, 0, [{index: 0, avatar: 7}], '', 1));
+  h.lose();
+  h.connect({resumed: false, token: 8});
+  h.sent();
+  h.receive(server.worldInfo(1n, 4, 'plaza'), server.reply(1n));
+  const again = h.sent().find(({type}) => type === 'Spawn');
+  assert.ok(again?.type === 'Spawn');
+  assert.deepEqual(again.items, [
+    {avatar: 7, positionM: [9, 0, 8], headingRad: 1, teleport: false}]);
 });
 
 test('reports repeated events only once', () => {

@@ -303,10 +303,23 @@ void SessionCommands::Execute(protocol::Spawn&& command) {
   Pending pending{.item_count = command.items.size(), .reply = {}};
   std::uint32_t index = 0;
   for (protocol::SpawnItem& item : command.items) {
-    const auto refuse = [&](const char* text) {
-      pending.reply.items.push_back(
-          {.index = index, .avatar = item.avatar, .code = StatusCode::kLimitReached, .text = text});
+    const auto submit = [&] {
+      parts[static_cast<std::size_t>(ShardOf(item.avatar, shard_count))].items.push_back(
+          {index, item});
     };
+    const auto refuse = [&](const char* text, StatusCode code = StatusCode::kLimitReached) {
+      pending.reply.items.push_back(
+          {.index = index, .avatar = item.avatar, .code = code, .text = text});
+    };
+    if (item.teleport) {
+      if (item.avatar != 0) {
+        submit();
+      } else {
+        refuse("a teleport needs the id of an avatar", StatusCode::kNoSuchAvatar);
+      }
+      ++index;
+      continue;
+    }
     switch (budget.Reserve(world)) {
       case AvatarBudget::Verdict::kOk:
         if (item.avatar != 0) {
@@ -318,8 +331,7 @@ void SessionCommands::Execute(protocol::Spawn&& command) {
           budget.Release(world);
           refuse("no avatar id is left in this world");
         } else {
-          parts[static_cast<std::size_t>(ShardOf(item.avatar, shard_count))].items.push_back(
-              {index, item});
+          submit();
         }
         break;
       case AvatarBudget::Verdict::kWorldFull:

@@ -118,23 +118,35 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
   for (const SpawnPart::Item& item : part.items) {
     const AvatarId id = item.spawn.avatar;
     ReplyItem reply{.index = item.index, .avatar = id};
+    const auto existing = avatars_.find(id);
     if (!IsSpawnable(item.spawn.start)) {
       reply.code = StatusCode::kOutOfRange;
       reply.text = "start: expected a position within 100 km and a heading within 10000 rad";
-    } else if (avatars_.contains(id)) {
+    } else if (item.spawn.teleport && existing == avatars_.end()) {
+      reply = NoSuchAvatar(item.index, id);
+    } else if (!item.spawn.teleport && existing != avatars_.end()) {
       reply.code = StatusCode::kAvatarExists;
       reply.text = "an avatar with this id already exists";
     }
     if (reply.code != StatusCode::kOk) {
-      budget_.Release(*world_);
+      if (!item.spawn.teleport) budget_.Release(*world_);
       result.items.push_back(std::move(reply));
       continue;
     }
     const BaseFrame start = FromWire(item.spawn.start);
+    if (item.spawn.teleport) {
+      Entry& entry = existing->second;
+      entry.avatar.Teleport(start);
+      entry.placed_tick = tick;
+      ReportDropped(id, entry.avatar, tick);
+      ++result.accepted;
+      result.items.push_back(std::move(reply));
+      continue;
+    }
     options.seed = id;
     avatars_.emplace(id, Entry{.avatar = AvatarSimulation(world_->library, start, options),
                                .owner = command.session,
-                               .spawn_tick = tick});
+                               .placed_tick = tick});
     is_order_valid_ = false;
     if (interest_.events()) {
       AddEvent(EventType::kSpawned, id, tick).base = item.spawn.start;
@@ -420,7 +432,7 @@ void WorldShard::RecordMovements() {
   for (const std::uint32_t row : eventful_) {
     const auto& [id, entry] = ordered[row];
     if (!AppendChange(entry->avatar, movements_.back().records)) continue;
-    const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().needs_state;
+    const bool is_new = entry->placed_tick == tick_ && entry->avatar.change().needs_state;
     add(id, is_new ? protocol::kPoseDiscontinuity : 0);
   }
   const std::size_t parts = movements_.size() - first;

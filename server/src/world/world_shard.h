@@ -97,13 +97,13 @@ class WorldShard {
   struct Entry {
     AvatarSimulation avatar;
     SessionId owner = 0;
-    std::uint64_t spawn_tick = 0;
+    std::uint64_t placed_tick = 0;  // Tick of the spawn or of the last teleport.
     EncodedPoseCache::Slot poses;
   };
   // Prefetches the members that Encode reads of an avatar without events.
   static void Prefetch(const Entry& entry) {
     entry.avatar.PrefetchTickState();
-    PrefetchBytes(&entry.spawn_tick, sizeof(entry.spawn_tick) + sizeof(entry.poses));
+    PrefetchBytes(&entry.placed_tick, sizeof(entry.placed_tick) + sizeof(entry.poses));
   }
   struct OrderedAvatar {
     AvatarId id;

@@ -132,7 +132,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool all,
     std::uint8_t flags = 0;
     // The flag stays set for the longest interval of any observer, so that every observer receives
     // it.
-    if (tick < entry.spawn_tick + interest_.max_interval()) flags |= protocol::kPoseDiscontinuity;
+    if (tick < entry.placed_tick + interest_.max_interval()) flags |= protocol::kPoseDiscontinuity;
     if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
     rows.SkipTo(picked[i]);
     if (is_compact) {

@@ -753,6 +753,38 @@ TEST(ClientAndServer, AWalkArrives) {
   EXPECT_EQ(daemon.Terminate(), 0);
 }
 
+TEST(ClientAndServer, ATeleportEndsRequestsAndMovesTheAvatar) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Observe(user.world));
+  ASSERT_TRUE(user.client.Request(user.world, {client::Stand(1, 7, 100.0)}));
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_STARTED));
+  EXPECT_EQ(user.client.Teleport(user.world, {{0, {}, 0.0}}).status(), STRIDEWIRE_INVALID_ARGUMENT);
+  ASSERT_TRUE(user.client.Teleport(user.world, {{1, {20.0, 0.0, 5.0}, 0.0}}));
+  const auto ended = user.Next(STRIDEWIRE_EVENT_REJECTED);
+  ASSERT_TRUE(ended);
+  EXPECT_EQ(ended->request_id, 7u);
+  EXPECT_EQ(ended->outcome, STRIDEWIRE_OUTCOME_CANCELLED);
+  EXPECT_EQ(ended->status, STRIDEWIRE_DROPPED);
+  EXPECT_STREQ(ended->text, "the request was cancelled");
+  client::Pose pose;
+  EXPECT_TRUE(Eventually([&] {
+    return user.client.LatestPose(user.world, 1, pose) && !pose.missing() &&
+           std::abs(pose.root_position_m[0] - 20.0f) < 0.1f;
+  }));
+
+  // The ids of living avatars cannot be used again.
+  std::uint64_t command = 0;
+  ASSERT_TRUE(user.client.Spawn(user.world, {{1, {}, 0.0}, {2, {}, 0.0}}, &command));
+  auto reply = user.Next(STRIDEWIRE_EVENT_REPLY);
+  while (reply && reply->command != command) reply = user.Next(STRIDEWIRE_EVENT_REPLY);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status, STRIDEWIRE_AVATAR_EXISTS);
+  EXPECT_EQ(reply->accepted, 1u);
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
 TEST(ClientAndServer, AStepLandsOnItsFootprint) {
   Daemon daemon;
   User user(daemon.port());

@@ -143,6 +143,9 @@ class Controller {
       Send(protocol::CancelQueue{.seq = 0, .world = world_, .avatars = {avatar}});
     } else if (what < 0.91) {
       Send(protocol::Remove{.seq = 0, .world = world_, .avatars = {avatar}});
+    } else if (what < 0.92) {
+      Send(protocol::Spawn{
+          .seq = 0, .world = world_, .items = {{avatar, {DVec3(0.0, 0.0, avatar), 1.0}, true}}});
     } else if (what < 0.93) {
       Send(protocol::SetPlanting{
           .seq = 0, .world = world_, .avatars = {avatar}, .enabled = Draws(random_, 0.5)});

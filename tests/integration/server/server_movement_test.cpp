@@ -247,6 +247,13 @@ class Crowd {
     EXPECT_EQ(client_.Spawn(world_, {{avatar, {DVec3(0.0), 0.0}}})->accepted, 1u);
     EXPECT_TRUE(client_.Request(world_, Steps(avatar, 20, 0.5)));
   }
+  void Teleport(AvatarId avatar) {
+    EXPECT_EQ(
+        client_.Spawn(world_, {{.avatar = avatar, .start = {DVec3(-3.0), 1.0}, .teleport = true}})
+            ->accepted,
+        1u);
+    EXPECT_TRUE(client_.Request(world_, Steps(avatar, 20, 0.4)));
+  }
   void Remove(AvatarId avatar) {
     client_.Send(protocol::Remove{.seq = client_.NextSeq(), .world = world_, .avatars = {avatar}});
     ASSERT_TRUE(client_.Await<protocol::Reply>());
@@ -267,6 +274,7 @@ TEST(ServerMovement, MatchesFullPoses) {
   both.ReceiveUntil([&] { return both.evaluated().poses.size() > 40 * 60; });
   for (const AvatarId avatar : {3u, 4u, 9u, 12u}) crowd.Interrupt(avatar);
   crowd.Remove(7);
+  crowd.Teleport(8);
   both.ReceiveUntil([&] { return both.evaluated().poses.size() > 40 * 200; });
   const int compared = both.Compare();
   std::printf("%d poses compared, %d messages of states\n", compared, both.states());

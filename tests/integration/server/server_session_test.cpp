@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <random>
 #include <set>
@@ -306,6 +307,66 @@ TEST(ServerSession, ChoosesUnusedAvatarIds) {
   EXPECT_EQ(reply->items[1].avatar, 6u);
   EXPECT_EQ(reply->items[2].avatar, 7u);
   EXPECT_EQ(reply->items[3].code, StatusCode::kAvatarExists);
+}
+
+TEST(ServerSession, TeleportsLivingAvatars) {
+  TestServer server;
+  auto [owner, world] = server.Enter("w");
+  auto [other, joined] = server.Enter("w");
+  ASSERT_TRUE(world && joined);
+  ASSERT_TRUE(owner.Spawn(world->world, {{.avatar = 1}}));
+  ASSERT_TRUE(owner.Request(world->world, Steps(1, 3, 0.4)));
+  ASSERT_TRUE(other.Observe(world->world, 1, protocol::PoseMode::kFull));
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(other.Await<protocol::PoseBatch>());
+
+  // Another session may move the avatar. It remains with its owner.
+  const protocol::Placement place{{10.0, 0.0, 5.0}, 1.0};
+  const auto items = [&](protocol::AvatarId avatar) {
+    return std::vector<protocol::SpawnItem>{{.avatar = avatar, .start = place, .teleport = true}};
+  };
+  std::vector<std::pair<protocol::RequestId, protocol::RequestOutcome>> ended;
+  std::uint64_t jumped_tick = 0;
+  bool is_flagged = false;
+  bool has_reply = false;
+  other.Send(protocol::Spawn{.seq = other.NextSeq(), .world = world->world, .items = items(1)});
+  while (!has_reply || jumped_tick == 0 || ended.size() < 3) {
+    const auto message = other.Receive();
+    ASSERT_TRUE(message);
+    if (const auto* reply = std::get_if<Reply>(&*message)) {
+      EXPECT_EQ(reply->accepted, 1u);
+      has_reply = true;
+    } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
+      ASSERT_EQ(batch->avatars.size(), 1u);
+      float x_m = 0.0f;
+      std::memcpy(&x_m, batch->pose(0).data(), sizeof x_m);
+      if (jumped_tick != 0 || x_m < 9.0f) continue;
+      jumped_tick = batch->info.tick;
+      EXPECT_NEAR(x_m, 10.0f, 0.1f);
+      is_flagged = (batch->flags[0] & protocol::kPoseDiscontinuity) != 0;
+    } else if (const auto* events = std::get_if<protocol::Events>(&*message)) {
+      for (const protocol::Event& event : events->events) {
+        if (event.outcome != protocol::RequestOutcome::kNone) {
+          ended.emplace_back(event.request_id, event.outcome);
+        }
+      }
+    }
+  }
+  EXPECT_TRUE(is_flagged);
+  EXPECT_EQ(ended, (std::vector<std::pair<protocol::RequestId, protocol::RequestOutcome>>{
+                       {1, protocol::RequestOutcome::kCancelled},
+                       {2, protocol::RequestOutcome::kCancelled},
+                       {3, protocol::RequestOutcome::kCancelled}}));
+
+  for (const protocol::AvatarId unknown : {0u, 2u}) {
+    const auto reply = other.Spawn(world->world, items(unknown));
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->accepted, 0u);
+    ASSERT_EQ(reply->items.size(), 1u);
+    EXPECT_EQ(reply->items[0].code, StatusCode::kNoSuchAvatar);
+  }
+  EXPECT_EQ(server.metrics().Sum(&ThreadMetrics::avatars), 1);
+  owner.Send(protocol::Goodbye{.code = StatusCode::kOk, .text = ""});
+  EXPECT_TRUE(Eventually([&] { return server.metrics().Sum(&ThreadMetrics::avatars) == 0; }));
 }
 
 TEST(ServerSession, RejectsItemsIndividually) {

@@ -701,6 +701,29 @@ TEST_F(SessionTest, ReportsRefusedItemsAndChosenIds) {
   EXPECT_EQ(events[2].type, STRIDEWIRE_EVENT_REPLY);
   EXPECT_EQ(events[2].command, command_);
   EXPECT_EQ(events[2].accepted, 1u);
+  // The application need not look at the items to see that one of them failed.
+  EXPECT_EQ(events[2].status, STRIDEWIRE_AVATAR_EXISTS);
+  EXPECT_STREQ(events[2].text, "item 1: avatar 2 is there");
+}
+
+TEST_F(SessionTest, RespawnsATeleportedAvatarAtItsNewPlace) {
+  SessionOptions options;
+  options.respawn = true;
+  Use(options);
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_OK);
+  Receive(SpawnReply(std::get<protocol::Spawn>(Sent().at(0))));
+  const protocol::Placement place{{9.0, 0.0, 8.0}, 0.5};
+  // Avatar 2 belongs to another session.
+  EXPECT_EQ(session_->Spawn(world, {0, 0, {{1, place, true}, {2, place, true}}}, command_),
+            STRIDEWIRE_OK);
+  Receive(SpawnReply(std::get<protocol::Spawn>(Sent().at(0))));
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(false);
+  AnswerJoin();
+  const auto spawn = std::get<protocol::Spawn>(Sent().at(0));
+  ASSERT_EQ(spawn.items.size(), 1u);
+  EXPECT_EQ(spawn.items[0], (protocol::SpawnItem{1, place}));
 }
 
 TEST_F(SessionTest, ClosesAfterPermanentErrorsAndReconnectsAfterOthers) {

@@ -173,7 +173,8 @@ stridewire_status stridewire_client_leave_world(stridewire_client* client, strid
 
 /// An avatar to spawn.
 typedef struct stridewire_spawn {
-  /// Id of the avatar in its world. 0: the server chooses an id and reports it in an ITEM event.
+  /// Id of the avatar in its world. 0: the server chooses an id and reports it in an ITEM event. If
+  /// the id is in use, the server refuses the item with AVATAR_EXISTS.
   uint32_t avatar;
   double position_m[3];  ///< World position of the base frame.
   double heading_rad;    ///< Heading of the base frame.
@@ -183,6 +184,13 @@ typedef struct stridewire_spawn {
 stridewire_status stridewire_client_spawn(stridewire_client* client, stridewire_world world,
                                           const stridewire_spawn* spawns, size_t count,
                                           uint64_t* command);
+
+/// Moves `count` existing avatars, 1 to STRIDEWIRE_MAX_ITEMS, at once. They drop their movements
+/// and requests, and stand. Their next pose follows a discontinuity. Fails with INVALID_ARGUMENT if
+/// the id of an avatar is 0.
+stridewire_status stridewire_client_teleport(stridewire_client* client, stridewire_world world,
+                                             const stridewire_spawn* places, size_t count,
+                                             uint64_t* command);
 
 /// Removes `count` avatars, 1 to STRIDEWIRE_MAX_ITEMS.
 stridewire_status stridewire_client_remove(stridewire_client* client, stridewire_world world,
@@ -435,7 +443,10 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_CLOSED = 4,           ///< Uses status, text. The client does not try again.
   /// Uses world. The skeleton is available. Repeated after SESSION_LOST.
   STRIDEWIRE_EVENT_WORLD_JOINED = 5,
-  STRIDEWIRE_EVENT_REPLY = 6,  ///< Uses command, status, accepted, text.
+  /// Uses command, status, accepted, text. The status is OK only if the server has executed all
+  /// items. If it refused some of them, it is the status of the first one, and `accepted` is the
+  /// number of the others, which were executed.
+  STRIDEWIRE_EVENT_REPLY = 6,
   /// Uses command, item_index, avatar, request_id, status, text. Reports an item that the server
   /// refused, or the avatar id that it chose. Precedes the REPLY.
   STRIDEWIRE_EVENT_ITEM = 7,
@@ -493,7 +504,7 @@ typedef enum stridewire_outcome {
   /// FINISHED: the movement was played to its end, or the walk has arrived.
   STRIDEWIRE_OUTCOME_COMPLETED = 1,
   STRIDEWIRE_OUTCOME_REJECTED = 2,  ///< REJECTED: the avatar could not execute the request.
-  /// REJECTED: stridewire_client_cancel dropped the request.
+  /// REJECTED: stridewire_client_cancel or a teleport dropped the request.
   STRIDEWIRE_OUTCOME_CANCELLED = 3,
   /// REJECTED or FINISHED: a request with an interrupt dropped this one, or cut its movement short.
   STRIDEWIRE_OUTCOME_REPLACED = 4,

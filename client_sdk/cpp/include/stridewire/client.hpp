@@ -213,6 +213,10 @@ class Client {
                std::uint64_t* command = nullptr) {
     return stridewire_client_spawn(handle_, world, spawns.data(), spawns.size(), command);
   }
+  Result Teleport(stridewire_world world, const std::vector<stridewire_spawn>& places,
+                  std::uint64_t* command = nullptr) {
+    return stridewire_client_teleport(handle_, world, places.data(), places.size(), command);
+  }
   Result Remove(stridewire_world world, const std::vector<std::uint32_t>& avatars,
                 std::uint64_t* command = nullptr) {
     return stridewire_client_remove(handle_, world, avatars.data(), avatars.size(), command);

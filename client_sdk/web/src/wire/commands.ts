@@ -40,8 +40,8 @@ export function joinWorld(name: string, role: Role): JoinWorld {
 export function spawn(items: readonly SpawnItem[]): Spawn {
   return {
     type: 'Spawn', seq: anySeq, world: anyWorld,
-    items: convert(items, 'items', ({avatar, positionM, headingRad}) =>
-        ({avatar: avatar ?? 0, positionM, headingRad})),
+    items: convert(items, 'items', ({avatar, positionM, headingRad, teleport}) =>
+        ({avatar: avatar ?? 0, positionM, headingRad, teleport: teleport ?? false})),
   };
 }
 

@@ -102,7 +102,8 @@ export function toJson(m: Message, frame: ArrayBuffer): {[name: string]: Json} {
       return {
         seq: u64(m.seq), world: m.world,
         items: m.items.map((item) => ({
-          avatar: item.avatar, position_m: vec3(item.positionM), heading_rad: item.headingRad
+          avatar: item.avatar, position_m: vec3(item.positionM), heading_rad: item.headingRad,
+          ...(item.teleport ? {teleport: true} : {}),
         })),
       };
     case 'Remove':
