@@ -39,6 +39,7 @@ tests=(
   libgmock-dev
   libgtest-dev
   librapidcheck-dev
+  pkgconf  # A test compiles a C program with the flags of the installed package.
 )
 # The web client contains core, protocol and session of the C++ client, compiled to WebAssembly.
 build+=(
