@@ -22,12 +22,17 @@ WebClient::WebClient(std::uint16_t port, const Options& options) : stream_(conte
   websocket::permessage_deflate compression;
   compression.client_enable = true;
   stream_.set_option(compression);
-  stream_.set_option(websocket::stream_base::decorator(
-      [origin = options.origin](websocket::request_type& request) {
-        if (!origin.empty()) request.set(boost::beast::http::field::origin, origin);
-      }));
+  stream_.set_option(websocket::stream_base::decorator([options](websocket::request_type& request) {
+    if (!options.origin.empty()) {
+      request.set(boost::beast::http::field::origin, options.origin);
+    }
+    if (!options.forwarded_for.empty()) {
+      request.set("X-Forwarded-For", options.forwarded_for);
+    }
+  }));
   stream_.control_callback([this](websocket::frame_type type, boost::beast::string_view) {
     if (type == websocket::frame_type::pong) ++pongs_;
+    if (type == websocket::frame_type::ping) ++pings_;
   });
   stream_.binary(true);
   stream_.read_message_max(0);

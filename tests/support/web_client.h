@@ -16,8 +16,9 @@ class WebClient : public RawClient {
  public:
   struct Options {
     std::string path = "/stream";
-    std::string host;    ///< Header Host; empty: the address.
-    std::string origin;  ///< Empty: no header, like a program that is not a browser.
+    std::string host;           ///< Header Host; empty: the address.
+    std::string origin;         ///< Empty: no header, like a program that is not a browser.
+    std::string forwarded_for;  ///< Header X-Forwarded-For; empty: no header.
     int receive_buffer_bytes = 0;
   };
 
@@ -47,6 +48,8 @@ class WebClient : public RawClient {
   [[nodiscard]] unsigned close_code() const { return stream_.reason().code; }
   /// Returns the number of received pongs.
   [[nodiscard]] int pongs() const { return pongs_; }
+  /// Returns the number of received pings. They are answered while Receive waits.
+  [[nodiscard]] int pings() const { return pings_; }
   /// Returns the bytes of the last frame.
   [[nodiscard]] std::span<const std::byte> last_frame() const { return frame_; }
 
@@ -61,6 +64,7 @@ class WebClient : public RawClient {
   bool has_message_ = false;
   unsigned upgrade_status_ = 0;
   int pongs_ = 0;
+  int pings_ = 0;
   std::string extensions_;
 };
 

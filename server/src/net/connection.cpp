@@ -15,6 +15,8 @@ using boost::system::error_code;
 
 constexpr std::size_t kReadBufferBytes = std::size_t{32} << 10;
 constexpr std::size_t kWriteBytes = std::size_t{256} << 10;
+// A silent peer is pinged this often before it counts as idle.
+constexpr double kPingsPerIdleTimeout = 3.0;
 
 }  // namespace
 
@@ -247,6 +249,12 @@ void Connection::Watch() {
     } else if (self->limits_.idle_timeout_s > 0.0 && !self->is_paused_ &&
                seconds_since(self->traffic_.last_received()) > self->limits_.idle_timeout_s) {
       if (self->handler_ != nullptr) self->handler_->OnIdle();
+    } else if (self->limits_.idle_timeout_s > 0.0) {
+      const double ping_s = self->limits_.idle_timeout_s / kPingsPerIdleTimeout;
+      if (seconds_since(std::max(self->traffic_.last_received(), self->kept_alive_)) > ping_s) {
+        self->kept_alive_ = now;
+        self->transport_->KeepAlive(self);
+      }
     }
     if (!self->is_closed_) self->Watch();
   });

@@ -131,6 +131,7 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   Traffic traffic_;
   CloseCode close_code_ = CloseCode::kNormal;
   Clock::time_point closing_since_;
+  Clock::time_point kept_alive_;  // Time of the last KeepAlive.
 };
 
 }  // namespace stridewire::server

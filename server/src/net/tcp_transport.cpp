@@ -59,6 +59,7 @@ class TcpTransport final : public Transport {
     return true;
   }
 
+  void KeepAlive(std::shared_ptr<User> /*user*/) override {}
   bool End(std::shared_ptr<User> /*user*/, CloseCode /*code*/) override {
     return socket_.ShutDownSending();
   }

@@ -99,6 +99,10 @@ class Transport {
   [[nodiscard]] virtual bool Send(std::shared_ptr<User> user,
                                   std::span<const SharedFrame> frames) = 0;
 
+  /// Sends the peer something that it answers without its program's help, if the transport can. The
+  /// answer counts as received bytes.
+  virtual void KeepAlive(std::shared_ptr<User> user) = 0;
+
   /// Closes the sending direction after the last Send. The user continues to receive until the peer
   /// has closed, too. Returns false if the socket is already broken.
   [[nodiscard]] virtual bool End(std::shared_ptr<User> user, CloseCode code) = 0;

@@ -75,6 +75,15 @@ class WebSocketTransport final : public Transport {
     return false;
   }
 
+  // Browsers slow down the timers of hidden pages, so their programs send nothing for a minute. The
+  // browser itself answers a ping.
+  void KeepAlive(std::shared_ptr<User> user) override {
+    if (request_ || is_pinging_) return;
+    is_pinging_ = true;
+    stream_.async_ping({},
+                       [this, user = std::move(user)](const error_code&) { is_pinging_ = false; });
+  }
+
   bool End(std::shared_ptr<User> user, CloseCode code) override {
     // The pending Receive reports the answer of the peer.
     stream_.async_close(websocket::close_reason(static_cast<std::uint16_t>(code)),
@@ -103,6 +112,7 @@ class WebSocketTransport final : public Transport {
   websocket::stream<PortableSocket> stream_;
   std::optional<UpgradeRequest> request_;  // Set until the request has been answered.
   std::span<const SharedFrame> unsent_;
+  bool is_pinging_ = false;
 };
 
 }  // namespace

@@ -486,11 +486,29 @@ TEST(ServerStream, AnswersWebSocketPingsAndCountsThemAsActivity) {
   }
   EXPECT_EQ(client.pongs(), 8);
   EXPECT_EQ(server.metrics().Sum(Limit::kIdleTimeout), 0u);
-  // Afterwards the client is idle.
+  // Afterwards the client reads nothing, so it does not answer the pings of the server either.
+  EXPECT_TRUE(Eventually([&] { return server.metrics().Sum(Limit::kIdleTimeout) == 1; }));
   const auto notice = client.Await<ErrorNotice>();
   ASSERT_TRUE(notice);
   EXPECT_EQ(notice->code, StatusCode::kTimeout);
   EXPECT_EQ(server.metrics().Sum(Limit::kIdleTimeout), 1u);
+}
+
+// Like a hidden page, whose browser answers pings although its program sends nothing.
+TEST(ServerStream, PingsASilentClientSoThatItStaysConnected) {
+  server::Config config = TestConfig();
+  config.limits.idle_timeout_s = 0.6;
+  TestServer server(config);
+  WebClient client(server.http_port());
+  ASSERT_TRUE(client.SayHello());
+  EXPECT_FALSE(client.Receive(2500ms));
+  ASSERT_FALSE(client.is_closed());
+  EXPECT_GE(client.pings(), 3);
+  client.Send(protocol::Ping{.nonce = 7});
+  const auto pong = client.Await<protocol::Pong>();
+  ASSERT_TRUE(pong);
+  EXPECT_EQ(pong->nonce, 7u);
+  EXPECT_EQ(server.metrics().Sum(Limit::kIdleTimeout), 0u);
 }
 
 TEST(ServerStream, DoesNotCountAgainstHttpConnections) {
