@@ -137,8 +137,17 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     beast::error_code error;
     const auto remote = socket.remote_endpoint(error);
     if (error) return;  // The peer has closed the connection.
-    server_.stream_->on_stream(MakeWebSocketTransport(std::move(socket), parser_->release()),
-                               remote.address());
+    auto request = parser_->release();
+    // Proxies may add to a header or write another one.
+    std::string forwarded;
+    const auto [first, last] = request.equal_range("X-Forwarded-For");
+    for (auto it = first; it != last; ++it) {
+      if (!forwarded.empty()) forwarded += ',';
+      forwarded += View(it->value());
+    }
+    const auto client = server_.stream_->proxies.ClientOf(remote.address(), forwarded);
+    server_.stream_->on_stream(MakeWebSocketTransport(std::move(socket), std::move(request)),
+                               client);
   }
 
   void Answer(HttpAnswer answer, bool is_head, bool keep_alive) {
@@ -200,10 +209,8 @@ bool HttpServer::IsSlow(std::string_view method, const HttpQuery& query) const {
          query.path.starts_with(slow_page_.prefix) && pages_.find(query.path) == pages_.end();
 }
 
-void HttpServer::ServeStream(std::string path, OriginPolicy policy, std::function<bool()> is_open,
-                             OnStream on_stream) {
-  stream_ = std::make_unique<Stream>(std::move(path), std::move(policy), std::move(is_open),
-                                     std::move(on_stream));
+void HttpServer::ServeStream(Stream stream) {
+  stream_ = std::make_unique<const Stream>(std::move(stream));
 }
 
 void HttpServer::Accept(boost::asio::ip::tcp::socket socket) {

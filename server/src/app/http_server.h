@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/metrics.h"
+#include "base/trusted_proxies.h"
 #include "net/origin_policy.h"
 #include "net/transport.h"
 
@@ -57,20 +58,20 @@ class HttpServer {
   void SetSlowPage(std::string prefix, Page page);
   /// Sets the page for all paths that have no other page.
   void SetFallback(Page page) { fallback_ = std::move(page); }
-  /// Accepts WebSockets at `path` while `is_open` returns true.
-  void ServeStream(std::string path, OriginPolicy policy, std::function<bool()> is_open,
-                   OnStream on_stream);
+  /// A path that accepts WebSockets while `is_open` returns true.
+  struct Stream {
+    std::string path;
+    OriginPolicy policy;
+    TrustedProxies proxies;
+    std::function<bool()> is_open;
+    OnStream on_stream;
+  };
+  void ServeStream(Stream stream);
 
   void Accept(boost::asio::ip::tcp::socket socket);
 
  private:
   class Visit;
-  struct Stream {
-    std::string path;
-    OriginPolicy policy;
-    std::function<bool()> is_open;
-    OnStream on_stream;
-  };
   static constexpr int kMaxWaitingRequests = 16;
   struct SlowPage {
     std::string prefix;

@@ -236,12 +236,17 @@ void Server::SetTerrain(TerrainChange&& change) {
 // ---- HTTP
 
 void Server::AddPages() {
+  auto proxies = TrustedProxies::Parse(config_.trusted_proxies);
+  STRIDEWIRE_CHECK(proxies.has_value());  // The configuration was checked when it was read.
   http_.ServeStream(
-      "/stream", OriginPolicy(config_.allowed_origins, IsLoopback(config_.http)),
-      [this] { return !is_draining_; },
-      [this](std::unique_ptr<Transport> transport, const asio::ip::address& remote) {
-        handshakes_.Accept(std::move(transport), remote);
-      });
+      {.path = "/stream",
+       .policy = OriginPolicy(config_.allowed_origins, IsLoopback(config_.http)),
+       .proxies = *std::move(proxies),
+       .is_open = [this] { return !is_draining_; },
+       .on_stream =
+           [this](std::unique_ptr<Transport> transport, const asio::ip::address& client) {
+             handshakes_.Accept(std::move(transport), client);
+           }});
   http_.AddPage("/healthz", [](const HttpQuery&) { return HttpAnswer{.body = "ok\n"}; });
   http_.AddPage("/readyz", [this](const HttpQuery&) {
     return is_draining_ ? HttpAnswer{.status = 503, .body = "draining\n"}

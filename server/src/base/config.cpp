@@ -7,8 +7,10 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <thread>
 
+#include "base/trusted_proxies.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/limits.h"
 
@@ -161,6 +163,13 @@ Status CheckOrigin(std::string_view origin) {
               "http://localhost:8080");
 }
 
+Status CheckNetwork(std::string_view text) {
+  const std::string network(text);
+  const auto parsed = TrustedProxies::Parse(std::span(&network, 1));
+  if (parsed) return {};
+  return Fail(parsed.error().code, parsed.error().text);
+}
+
 Status CheckLogLevel(std::string_view text) {
   constexpr std::array kLevels = {"trace", "debug", "info", "warning", "error", "off"};
   if (std::ranges::find(kLevels, text) != kLevels.end()) return {};
@@ -183,6 +192,9 @@ std::vector<ConfigKey> MakeKeys() {
       List("allowed_origins",
            "Other web pages that may open /stream: https://HOST[:PORT],...; no wildcards",
            &Config::allowed_origins, CheckOrigin),
+      List("trusted_proxies",
+           "Addresses or networks of proxies whose X-Forwarded-For names the client of /stream",
+           &Config::trusted_proxies, CheckNetwork),
       Text("viewer_dir", "Folder with the viewer; empty: the viewer installed with the server",
            &Config::viewer_dir),
       Text("library", "Default library of worlds: a .swl file, or builtin", &Config::library,

@@ -44,6 +44,8 @@ struct Config {
   bool http_enabled = true;
   /// Origins of pages of other servers that may open a stream.
   std::vector<std::string> allowed_origins;
+  /// Addresses and networks of proxies (TrustedProxies::Parse).
+  std::vector<std::string> trusted_proxies;
   /// Folder of the viewer. Empty: the viewer that was installed with the program.
   std::string viewer_dir;
   std::string library = "builtin";

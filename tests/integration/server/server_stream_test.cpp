@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <random>
 
@@ -509,6 +510,32 @@ TEST(ServerStream, PingsASilentClientSoThatItStaysConnected) {
   ASSERT_TRUE(pong);
   EXPECT_EQ(pong->nonce, 7u);
   EXPECT_EQ(server.metrics().Sum(Limit::kIdleTimeout), 0u);
+}
+
+TEST(ServerStream, CountsTheAddressesThatTrustedProxiesForward) {
+  for (const bool is_trusted : {true, false}) {
+    SCOPED_TRACE(is_trusted);
+    server::Config config = TestConfig();
+    config.limits.max_sessions_per_address = 1;
+    if (is_trusted) config.trusted_proxies = {"10.0.0.0/8", "127.0.0.1"};
+    TestServer server(config);
+    std::vector<std::unique_ptr<WebClient>> clients;
+    const auto is_welcome = [&](const std::string& forwarded_for) {
+      clients.push_back(std::make_unique<WebClient>(
+          server.http_port(), WebClient::Options{.forwarded_for = forwarded_for}));
+      clients.back()->Send(protocol::Hello{.client_name = "test"});
+      const auto answer = clients.back()->Receive();
+      if (!answer) return false;
+      if (const auto* notice = std::get_if<ErrorNotice>(&*answer)) {
+        EXPECT_EQ(notice->text, "too many sessions from this address (max_sessions_per_address)");
+      }
+      return std::holds_alternative<protocol::Welcome>(*answer);
+    };
+    EXPECT_TRUE(is_welcome("203.0.113.1"));
+    EXPECT_EQ(is_welcome("203.0.113.2, 10.0.0.7"), is_trusted);
+    EXPECT_FALSE(is_welcome("203.0.113.9, 203.0.113.1"));
+    EXPECT_EQ(is_welcome("203.0.113.1, 203.0.113.3"), is_trusted);
+  }
 }
 
 TEST(ServerStream, DoesNotCountAgainstHttpConnections) {
