@@ -276,6 +276,10 @@ export class App {
       }
     });
     world.on('state', () => this.status.update());
+    void world.joined.then((reply) => {
+      pane.refusal = reply.ok ? '' : reply.text;
+      this.status.update();
+    });
     world.on('terrain', () => this.commands.onTerrainChanged(world));
     this.activePane ??= pane;
     this.camera.framesAll = true;

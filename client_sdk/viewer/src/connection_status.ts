@@ -41,7 +41,7 @@ export class ConnectionStatus {
     }
     const refused = state === 'ready' && this.panes.find(({world}) => world.state === 'refused');
     if (!refused) return '';
-    return `Cannot join world ${refused.world.name}: the server refused it. ` +
-      'Select another world above.';
+    const reason = refused.refusal.replace(/\.$/, '') || 'the server refused it';
+    return `Cannot join world ${refused.world.name}: ${reason}. Select another world above.`;
   }
 }

@@ -43,7 +43,7 @@ export class WorldPanes {
     const world = this.client.joinWorld(name, 'controller');
     const pane: WorldPane = {
       world, view: this.host.makeView(world), subscription: this.subscribe(world),
-      randomWalkers: null, ownAvatars: new Set()};
+      randomWalkers: null, ownAvatars: new Set(), refusal: ''};
     this.panes.push(pane);
     if (!this.worldNames.includes(name)) this.worldNames.push(name);
     this.host.onOpened(pane);

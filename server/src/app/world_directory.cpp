@@ -8,11 +8,7 @@ namespace stridewire::server {
 using protocol::StatusCode;
 
 Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
-  if (!IsWorldName(name)) {
-    return Refuse(
-        StatusCode::kInvalidArgument,
-        "a world name consists of 1 to 64 letters, digits, _ - . and does not start with a dot");
-  }
+  STRIDEWIRE_CHECK(IsWorldName(name));  // The decoder has checked the JoinWorld.
   if (const auto it = worlds_.find(name); it != worlds_.end()) {
     ++it->second.members;
     return it->second.world;

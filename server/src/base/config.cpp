@@ -12,6 +12,7 @@
 
 #include "base/trusted_proxies.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "stridewire/protocol/check.h"
 #include "stridewire/protocol/limits.h"
 
 namespace stridewire::server {
@@ -381,11 +382,7 @@ bool IsLoopback(const Endpoint& endpoint) {
 }
 
 bool IsWorldName(std::string_view name) {
-  if (name.empty() || name.size() > protocol::kMaxNameBytes || name.front() == '.') return false;
-  return std::ranges::all_of(name, [](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
-           c == '-' || c == '.';
-  });
+  return protocol::Check(protocol::JoinWorld{.seq = 1, .name = std::string(name)}).has_value();
 }
 
 Status CheckConfig(const Config& config) {

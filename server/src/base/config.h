@@ -95,8 +95,8 @@ struct ConfigKey {
 /// Returns all keys except those of worlds, in the order of --print-config.
 [[nodiscard]] const std::vector<ConfigKey>& ConfigKeys();
 
-/// True for 1 to 64 of the characters A-Z a-z 0-9 _ - and '.', without a leading dot. World names
-/// become parts of file names and metric labels, so other characters are not allowed.
+/// True for the names that the protocol allows: UTF-8 of 1 to kMaxNameBytes bytes without control
+/// characters. A world name must therefore not become part of a file name as it is.
 [[nodiscard]] bool IsWorldName(std::string_view name);
 
 /// Reads TOML text into `config`. Errors contain `name`, which is the file's name, the line and

@@ -127,8 +127,7 @@ Status ReadTable(const toml::table& root, const std::string& file, Config& confi
       } else {
         if (!IsWorldName(inner_name)) {
           return Fail(ErrorCode::kInvalidArgument,
-                      "a world name consists of 1 to 64 letters, digits, _ - . and does not start "
-                      "with a dot",
+                      "expected a world name: 1 to 64 bytes of UTF-8 without control characters",
                       where);
         }
         const toml::table* world = inner.as_table();

@@ -394,9 +394,12 @@ test('reports that WebGL is missing, and that a world cannot be joined', async (
     /needs WebGL 2/.test(await page.locator('.fatal').textContent()));
   await context.close();
 
-  const refused = await openPage(browser, server.httpPort, 'world=not%20a%20name&world=plaza');
-  await waitFor('the problem is shown', () => refused.page.evaluate(() =>
-    document.querySelector('.notice:not([hidden])')?.textContent.includes('Cannot join world')));
+  const name = 'x'.repeat(65);
+  const refused = await openPage(browser, server.httpPort, `world=${name}&world=plaza`);
+  await waitFor('the problem and its reason are shown', () => refused.page.evaluate((start) => {
+    const text = document.querySelector('.notice:not([hidden])')?.textContent ?? '';
+    return text.startsWith(start) && text.includes('64');
+  }, `Cannot join world ${name}: `));
   await waitFor('the other world is shown', () => refused.page.evaluate((count) =>
     window.stridewire.sampled().some(({world, avatars}) => world === 'plaza' && avatars.length >=
       count),
