@@ -44,7 +44,8 @@ for (const [placeholder, [name, extension, contents]] of Object.entries(files)) 
   const file = `${name}-${hash}.${extension}`;
   await writeFile(join(assets, file), contents);
   written.add(file);
-  pages.forEach((page, i) => (pages[i] = page.replaceAll(`%${placeholder}%`, `/assets/${file}`)));
+  // Relative, so that the pages also work below a path prefix.
+  pages.forEach((page, i) => (pages[i] = page.replaceAll(`%${placeholder}%`, `assets/${file}`)));
 }
 for (const file of await readdir(assets)) {
   if (!written.has(file)) await rm(join(assets, file));  // Removes files of an earlier build.

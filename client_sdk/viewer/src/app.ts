@@ -57,7 +57,7 @@ const toastMs = 8000;
 const pickReachPx = 28;
 
 export interface AppOptions {
-  /** Host and port of the server. */
+  /** Host and port of the server, and the path prefix of a proxy, without a slash at its end. */
   readonly host: string;
   /** True if the connection uses TLS. */
   readonly secure: boolean;
@@ -195,7 +195,7 @@ export class App {
       h('h1', {}, 'Stridewire'), this.worldPanes.element, this.qualityButton, this.status.element,
       this.sidePanels.toggles,
       h('div', {class: 'corner'},
-        h('a', {class: 'link', href: '/library.html', title: 'Explore the motion library'},
+        h('a', {class: 'link', href: 'library.html', title: 'Explore the motion library'},
           'Library'),
         this.frameButton, this.followButton, this.themeButton, help));
     this.bottom = h('footer', {class: 'bottom'}, this.playbackControls.element);

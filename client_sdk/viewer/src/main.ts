@@ -13,7 +13,9 @@ if (!info) {
   // ?server=host:port connects to a server other than the one that served this page.
   const server = new URLSearchParams(location.search).get('server');
   const app = new App(root, info, {
-    host: server && /^[\w.\-[\]:]+$/.test(server) ? server : location.host,
+    // The folder of this page, which may be below a path prefix of a proxy.
+    host: server && /^[\w.\-[\]:]+$/.test(server) ? server :
+      location.host + location.pathname.replace(/\/[^/]*$/, ''),
     secure: location.protocol === 'https:',
   });
   app.start();

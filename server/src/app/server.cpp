@@ -27,8 +27,8 @@ constexpr const char* kNoViewerPage = R"(<!doctype html>
 cmake --build --preset release --target viewer</pre>
 <p>Then restart build/release/bin/stridewired, or set the folder of a viewer with
 <code>--viewer-dir</code>.</p>
-<p>Worlds: <a href="/info.json">info.json</a>. Health: <a href="/healthz">healthz</a>,
-<a href="/readyz">readyz</a>, <a href="/metrics">metrics</a>. Streams: /stream, a WebSocket.</p>
+<p>Worlds: <a href="info.json">info.json</a>. Health: <a href="healthz">healthz</a>,
+<a href="readyz">readyz</a>, <a href="metrics">metrics</a>. Streams: /stream, a WebSocket.</p>
 </body></html>
 )";
 

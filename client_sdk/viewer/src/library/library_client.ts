@@ -106,7 +106,7 @@ interface SkeletonJson {
 /** Requests fail with an Error whose message can be shown to the user. */
 export class LibraryClient {
   /**
-   * `base` is the beginning of URLs: empty for the server that served this page, or
+   * `base` is the beginning of URLs: "." for the server that served this page, or
    * "http://host:port".
    */
   constructor(private readonly base: string) {}

@@ -112,7 +112,7 @@ export class LibraryPage {
     root.replaceChildren(
       h('header', {class: 'library-header'},
         h('h1', {}, 'Library'), this.librarySelect, this.groupSelect,
-        h('a', {class: 'link', href: `/${location.search}`}, 'Worlds'), theme),
+        h('a', {class: 'link', href: `./${location.search}`}, 'Worlds'), theme),
       h('div', {class: 'library-layout'},
         h('section', {class: 'parameter-area', 'aria-label': 'Parameters'},
           this.summaryArea,

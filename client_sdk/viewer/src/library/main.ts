@@ -11,7 +11,7 @@ if (!info) {
   root.replaceChildren(h('p', {class: 'fatal'},
     'This page needs WebGL 2. Enable hardware acceleration, or use another browser.'));
 } else {
-  const page = new LibraryPage(root, info, new LibraryClient(''));
+  const page = new LibraryPage(root, info, new LibraryClient('.'));
   Object.assign(window, {stridewireLibrary: page});
   void page.start();
 }

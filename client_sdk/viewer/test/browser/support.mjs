@@ -4,6 +4,7 @@
 import {spawn} from 'node:child_process';
 import {once} from 'node:events';
 import {mkdirSync, readFileSync} from 'node:fs';
+import http from 'node:http';
 import net from 'node:net';
 
 import {Client} from '@stridewire/client';
@@ -136,6 +137,53 @@ export class Proxy {
   stop() {
     this.listener.close();
     this.cut();
+  }
+}
+
+/** A reverse proxy that serves a server below a path, such as `/walk/`, and nothing else. */
+export class PrefixProxy {
+  static async start(target, prefix) {
+    const proxy = new PrefixProxy();
+    const onward = (request) => ({
+      host: '127.0.0.1', port: target, method: request.method, headers: request.headers,
+      path: request.url.slice(prefix.length - 1),
+    });
+    proxy.refused = [];
+    proxy.listener = http.createServer((request, response) => {
+      if (!request.url.startsWith(prefix)) {
+        proxy.refused.push(request.url);
+        response.writeHead(404).end();
+        return;
+      }
+      http.get(onward(request), (answer) => {
+        response.writeHead(answer.statusCode, answer.headers);
+        answer.pipe(response);
+      }).on('error', () => response.destroy());
+    });
+    proxy.listener.on('upgrade', (request, socket) => {
+      socket.on('error', () => {});
+      if (!request.url.startsWith(prefix)) {
+        proxy.refused.push(request.url);
+        socket.destroy();
+        return;
+      }
+      http.get(onward(request)).on('upgrade', (answer, server, head) => {
+        const headers = Object.entries(answer.headers).map(([key, value]) => `${key}: ${value}`);
+        socket.write(`HTTP/1.1 101 Switching Protocols\r\n${headers.join('\r\n')}\r\n\r\n`);
+        socket.write(head);
+        server.on('error', () => {});
+        server.pipe(socket).pipe(server);
+      }).on('error', () => socket.destroy());
+    });
+    proxy.listener.listen(0, '127.0.0.1');
+    await once(proxy.listener, 'listening');
+    proxy.port = proxy.listener.address().port;
+    return proxy;
+  }
+
+  stop() {
+    this.listener.close();
+    this.listener.closeAllConnections();
   }
 }
 

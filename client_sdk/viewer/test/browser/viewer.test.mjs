@@ -12,7 +12,7 @@ import {createCrowdPose} from '@stridewire/client';
 
 import {launch} from '../browser.mjs';
 import {
-  Proxy, Server, Walkers, changedShare, dumpPoses, numberFrom, openInContext, openPage,
+  PrefixProxy, Proxy, Server, Walkers, changedShare, dumpPoses, numberFrom, openInContext, openPage,
   saveScreenshot, sleep, waitFor, waitForAvatars, waitForCamera, waitForFrames,
 } from './support.mjs';
 
@@ -406,6 +406,28 @@ test('reports that WebGL is missing, and that a world cannot be joined', async (
   walkerCount + 1));
   assert.deepEqual(refused.errors, []);
   await refused.context.close();
+});
+
+test('works below a path prefix of a proxy', async () => {
+  const prefixProxy = await PrefixProxy.start(server.httpPort, '/walk/');
+  const context = await browser.newContext({viewport: {width: 480, height: 320}});
+  try {
+    const base = `http://127.0.0.1:${prefixProxy.port}/walk/`;
+    const {page, errors} = await openInContext(context, `${base}?frames=5&world=plaza`);
+    await waitForAvatars(page, walkerCount);
+    await page.click('a[href="library.html"]');
+    await page.waitForURL(`${base}library.html`);
+    await waitFor('the library page shows a step', () => page.evaluate(
+      () => document.querySelector('canvas') !== null));
+    await page.click('a.link:has-text("Worlds")');
+    await page.waitForURL((url) => url.href.startsWith(base) && !url.href.includes('library'));
+    await waitForAvatars(page, walkerCount);
+    assert.deepEqual(prefixProxy.refused, []);
+    assert.deepEqual(errors, []);
+  } finally {
+    await context.close();
+    prefixProxy.stop();
+  }
 });
 
 test('memory use stays constant', async () => {
