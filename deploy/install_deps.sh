@@ -40,6 +40,9 @@ tests=(
   libgtest-dev
   librapidcheck-dev
   pkgconf  # A test compiles a C program with the flags of the installed package.
+  python3-numpy  # The Python package needs it; a test installs the package with pip.
+  python3-pip
+  python3-setuptools
 )
 # The web client contains core, protocol and session of the C++ client, compiled to WebAssembly.
 build+=(

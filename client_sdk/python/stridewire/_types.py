@@ -1,0 +1,200 @@
+"""Values of the Python client."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class EventType(enum.IntEnum):
+    """Type of an event. Those from ACCEPTED on are about an avatar."""
+
+    CONNECTED = 0
+    CONNECT_FAILED = 1
+    CONNECTION_LOST = 2
+    SESSION_LOST = 3
+    CLOSED = 4
+    WORLD_JOINED = 5
+    REPLY = 6
+    ITEM = 7
+    LAGGING = 8
+    NOTICE = 9
+    PONG = 10
+    TERRAIN = 11
+    ACCEPTED = 32
+    STARTED = 33
+    FOOT_STRIKE = 34
+    FINISHED = 35
+    IDLE = 36
+    REJECTED = 37
+    SPAWNED = 38
+    REMOVED = 39
+    ENTERED = 40
+    LEFT = 41
+
+
+class Outcome(enum.IntEnum):
+    """How a request ended. Every accepted request has exactly one event with another value than
+    NONE."""
+
+    NONE = 0
+    COMPLETED = 1
+    REJECTED = 2
+    CANCELLED = 3
+    REPLACED = 4
+    REMOVED = 5
+
+
+class Kind(enum.IntEnum):
+    """Kind of a movement that an avatar plays."""
+
+    STEP_LEFT = 0
+    STEP_RIGHT = 1
+    JUMP = 2
+    STAND = 3
+
+
+class Foot(enum.IntEnum):
+    """The foot that a step moves. AUTO is the foot that did not move last."""
+
+    AUTO = 0
+    LEFT = 1
+    RIGHT = 2
+
+
+class Interrupt(enum.IntEnum):
+    """When a request begins. All values except QUEUED also drop the requests queued before."""
+
+    QUEUED = 0
+    AFTER_MOVEMENT = 1
+    NOW = 2
+
+
+class PoseMode(enum.IntEnum):
+    """How poses arrive: without loss, compressed, or evaluated by this client (without loss)."""
+
+    FULL = 0
+    QUANTISED = 1
+    MOVEMENT = 2
+
+
+class PoseKind(enum.IntEnum):
+    """Origin of a pose."""
+
+    MISSING = 0
+    INTERPOLATED = 1
+    HELD = 2
+    RAW = 3
+
+
+class StridewireError(Exception):
+    """A call or command that failed. `status` is a name such as "no_such_avatar"."""
+
+    def __init__(self, status: str, text: str) -> None:
+        super().__init__(f"{status}: {text}")
+        self.status = status
+        self.text = text
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened. Fields that its type does not use are 0 or empty."""
+
+    type: EventType
+    status: str  #: Name of a status, "ok" if nothing failed.
+    text: str
+    command: int
+    world: int
+    avatar: int
+    request_id: int  #: 0 for a movement that the server inserted.
+    tick: int
+    time_s: float  #: Server time.
+    kind: Kind
+    foot: Foot
+    item_index: int
+    accepted: int
+    outcome: Outcome
+    cut_short: bool
+    clamped: bool
+    extrapolated: bool
+    resumed: bool
+    position_m: tuple[float, float, float]
+    base_position_m: tuple[float, float, float]
+    base_heading_rad: float
+    missed_m: float
+    nearest_length_m: float
+    speed_m_s: float
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """The joints of all avatars of a world. A joint follows its parent in the arrays."""
+
+    names: tuple[str, ...]
+    parents: NDArray[np.int32]  #: Shape (joints,); -1 for the root, joint 0.
+    offsets_m: NDArray[np.float32]  #: Shape (joints, 3), relative to the parent.
+    tick_hz: float
+    library_hash: str
+
+    def joint_positions_m(self, root_position_m: NDArray[np.float32],
+                          rotations_xyzw: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Returns the world positions of all joints.
+
+        `root_position_m` has the shape (..., 3) and `rotations_xyzw` (..., joints, 4). The result
+        has the shape (..., joints, 3).
+        """
+        positions = np.empty(rotations_xyzw.shape[:-1] + (3,), np.float32)
+        world = np.empty_like(rotations_xyzw)
+        for joint, parent in enumerate(self.parents):
+            if parent < 0:
+                positions[..., joint, :] = root_position_m
+                world[..., joint, :] = rotations_xyzw[..., joint, :]
+                continue
+            turn = world[..., parent, :]
+            positions[..., joint, :] = (positions[..., parent, :]
+                                        + rotate(turn, self.offsets_m[joint]))
+            world[..., joint, :] = multiply(turn, rotations_xyzw[..., joint, :])
+        return positions
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A pose of an avatar."""
+
+    kind: PoseKind
+    tick: int
+    time_s: float  #: Server time.
+    root_position_m: NDArray[np.float32]  #: Shape (3,), in the world.
+    #: Shape (joints, 4). The first rotation is in the world, the others relative to the parent.
+    rotations_xyzw: NDArray[np.float32]
+    discontinuity: bool  #: True: do not interpolate between the pose before and this one.
+    standing: bool  #: True: the avatar stands and has no request.
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Poses of one avatar, tick by tick."""
+
+    times_s: NDArray[np.float64]  #: Shape (n,), server time.
+    root_positions_m: NDArray[np.float32]  #: Shape (n, 3).
+    rotations_xyzw: NDArray[np.float32]  #: Shape (n, joints, 4).
+    events: tuple[Event, ...]  #: Events of the avatar during the recording.
+
+
+def rotate(q: NDArray[np.float32], v: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Rotates the vectors v by the unit quaternions q (x, y, z, w)."""
+    axis = q[..., :3]
+    t = 2.0 * np.cross(axis, v)
+    return v + q[..., 3:] * t + np.cross(axis, t)
+
+
+def multiply(p: NDArray[np.float32], q: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Returns the product p q of quaternions (x, y, z, w)."""
+    out = np.empty(np.broadcast_shapes(p.shape, q.shape), np.float32)
+    out[..., :3] = (p[..., 3:] * q[..., :3] + q[..., 3:] * p[..., :3]
+                    + np.cross(p[..., :3], q[..., :3]))
+    out[..., 3] = p[..., 3] * q[..., 3] - np.sum(p[..., :3] * q[..., :3], axis=-1)
+    return out
