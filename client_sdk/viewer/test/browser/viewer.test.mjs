@@ -421,7 +421,7 @@ test('works below a path prefix of a proxy', async () => {
       () => document.querySelector('canvas') !== null));
     await page.click('a.link:has-text("Worlds")');
     await page.waitForURL((url) => url.href.startsWith(base) && !url.href.includes('library'));
-    await waitForAvatars(page, walkerCount);
+    await waitForAvatars(page);
     assert.deepEqual(prefixProxy.refused, []);
     assert.deepEqual(errors, []);
   } finally {

@@ -87,9 +87,10 @@ Status AvatarSimulation::SetFootPlanting(bool enabled) {
 
 void AvatarSimulation::AddEvent(const AvatarEvent& event) {
   STRIDEWIRE_CHECK(events_.size() < max_events_);
-  STRIDEWIRE_CHECK(events_.empty() || events_.back().time_s <= time_s_);
+  // Rounding may set time_s_ back by one bit after the events of dropped requests.
+  const double time_s = events_.empty() ? time_s_ : std::max(time_s_, events_.back().time_s);
   AvatarEvent& added = events_.emplace_back(event);
-  added.time_s = time_s_;
+  added.time_s = time_s;
   if (event.type == AvatarEventType::kStarted) started_ = added;
   if (event.type == AvatarEventType::kRejected && event.outcome == RequestOutcome::kNone) {
     added.outcome = RequestOutcome::kRejected;
