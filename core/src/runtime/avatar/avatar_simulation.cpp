@@ -247,6 +247,7 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
     SwitchPlanting();
     if (auto plan = PlanClosingStep()) {
       if (is_hurried) plan->max_rate = kHurriedRate;
+      EndIdleMotion();  // The walk may have ended earlier than the delay of its next request.
       StartInserted(*plan, scratch);
       return true;
     }
