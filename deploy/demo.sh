@@ -65,9 +65,9 @@ if $build; then
   if command -v npm >/dev/null; then viewer=ON; fi
   export CCACHE_BASEDIR="$root" CCACHE_NOHASHDIR=1
   { cmake --preset release -DSTRIDEWIRE_BUILD_VIEWER=$viewer &&
-    # stridewire-load is built for `cmake --install`, which installs all programs.
+    # `cmake --install` also installs stridewire-load and the shared library.
     cmake --build --preset release --parallel "$(nproc)" --target "${programs[@]}" \
-      stridewire-load; } \
+      stridewire-load stridewire_client_shared; } \
     >"$out/build.log" 2>&1 ||
     { tail -n 30 "$out/build.log" >&2; fail "the build failed; see $out/build.log"; }
   if [[ $viewer == OFF ]]; then
