@@ -131,6 +131,7 @@ class NoTransport final : public server::Transport {
   bool Send(std::shared_ptr<User> /*user*/, std::span<const SharedFrame> /*frames*/) override {
     return true;
   }
+  void KeepAlive(std::shared_ptr<User> /*user*/) override {}
   bool End(std::shared_ptr<User> /*user*/, server::CloseCode /*code*/) override { return false; }
   void Close() override {}
   void Detach() override {}
