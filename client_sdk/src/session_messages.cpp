@@ -232,7 +232,7 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
     // The subscription has already ended, which is the requested state.
     if (status == STRIDEWIRE_NO_SUCH_SUBSCRIPTION) status = STRIDEWIRE_OK;
   }
-  // An item that failed must not be overlooked.
+  // If only some items failed, the reply as a whole is OK. Report the first failed item instead.
   std::string text = message.text;
   for (const protocol::ReplyItem& item : message.items) {
     if (status != STRIDEWIRE_OK) break;
@@ -331,8 +331,8 @@ void Session::OnObserveReply(World& world, const protocol::Observe& observe,
     UpdateFilter(world);
     return;
   }
-  // Earlier poses belong to a subscription that has ended. The server cannot flag the discontinuity
-  // in batches that clients share.
+  // Earlier poses belong to a subscription that has ended. The server cannot flag this gap, because
+  // it sends the same batches to other clients.
   if (world.subscriptions.size() == 1) world.view->Break();
 }
 

@@ -20,8 +20,8 @@ class LatencyProbes {
  public:
   explicit LatencyProbes(std::size_t avatar_count) : probes_(avatar_count) {}
 
-  /// Starts a probe. An open probe of the avatar is closed and counts with the time until `now_ns`,
-  /// so that a server that never shows a step does not appear faster.
+  /// Starts a probe. If the avatar has an open probe, closes it and records the time until `now_ns`
+  /// as its latency, so that a server that drops steps does not appear faster.
   void Schedule(std::size_t avatar, std::uint64_t request, std::int64_t scheduled_ns,
                 std::int64_t now_ns);
 
@@ -43,7 +43,8 @@ class LatencyProbes {
   /// Discards all measurements. Open probes stay open.
   void StartCounting() { times_ = LatencyHistogram(); }
 
-  /// Closes all open probes, which count with the time until `now_ns`. Returns their number.
+  /// Closes all open probes and records the time until `now_ns` as their latency. Returns how many
+  /// probes were open.
   std::size_t Finish(std::int64_t now_ns);
 
   [[nodiscard]] std::size_t open_count() const { return open_count_; }

@@ -1,10 +1,10 @@
-// The functions that the web client calls in its WebAssembly module. src/module.ts declares them.
+// The functions of the WebAssembly module, which the web client calls. src/native.ts declares them.
 //
-// Messages cross the border as frames (protocol/STANDARD.md), in both directions: the web client
-// writes a command as a frame to the memory of `input`, and reads received messages from their
-// frames, which are verified and checked here first. Numbers that a function returns besides its
-// result are in `results`, whose entries are described at each function. Texts are at
-// `text_at` .. `text_at + results[kTextBytes]`.
+// Messages are passed as frames (protocol/STANDARD.md). To send a command, the web client writes
+// its frame to the memory of `input`. To handle a received message, it first passes the frame to
+// `on_frame`, which verifies it, and then reads the fields from the frame. Numbers that a function
+// returns besides its result are in `results`; the comment of each function describes them. A text
+// has results[kTextBytes] bytes and begins at address results[kTextAt].
 
 #include <algorithm>
 #include <array>

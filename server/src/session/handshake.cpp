@@ -86,7 +86,7 @@ Handshakes::Handshakes(boost::asio::io_context& context, const Limits& limits,
       metrics_(metrics),
       directory_(directory),
       adopt_(std::move(adopt)) {
-  // Before Hello, a client may send no frame that is larger than Hello.
+  // Before Hello, frames may not be larger than a Hello.
   handshake_limits_.max_control_bytes =
       std::min(limits.max_control_bytes, protocol::kMaxHelloBytes);
   handshake_limits_.max_bulk_bytes = handshake_limits_.max_control_bytes;
@@ -154,7 +154,7 @@ void Handshakes::OnHello(Handshake& handshake, const protocol::Hello& hello) {
 void Handshakes::Remove(Handshake& handshake) {
   const auto it = handshakes_.find(&handshake);
   if (it == handshakes_.end()) return;
-  // The caller may be the handshake or its connection, so it is destroyed later.
+  // The handshake or its connection may be calling this function, so post their destruction.
   const std::shared_ptr<Handshake> removed = std::move(it->second);
   handshakes_.erase(it);
   const auto count = address_counts_.find(removed->address());

@@ -124,7 +124,7 @@ class EncodedPoseCache {
   EncodedPoseCache& operator=(const EncodedPoseCache&) = delete;
 
   /// Sets the compact modes in which poses are encoded. Poses are needed every `steps_apart` steps.
-  /// If either changes, all slots become empty. Not between BeginStep and FinishStep.
+  /// If either changes, all slots become empty. Do not call it between BeginStep and FinishStep.
   void SetModes(std::span<const protocol::PoseMode> compact_modes, int steps_apart);
 
   /// Selects the step whose poses the following calls concern. `step_s` is the length of a step,

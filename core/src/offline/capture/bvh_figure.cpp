@@ -52,7 +52,7 @@ class FigureBuilder {
   struct KeptJoint {
     int source = 0;
     int parent = -1;           // In the figure.
-    bool is_attached = false;  // The parent in the file is above the root of the figure.
+    bool is_attached = false;  // A child of the root whose parent in the file is above the root.
   };
 
   // Finds the legs of every root of the file, and selects the first one that has legs.
@@ -232,7 +232,7 @@ class FigureBuilder {
     figure_.legs.root = in_figure[Index(figure_.legs.root)];
   }
 
-  // The motion of the joints above a joint of the chain.
+  // The position and rotation of a chain joint in the frame of another one.
   struct Transform {
     DVec3 position = DVec3(0.0);
     DQuat rotation = DQuat(1.0, 0.0, 0.0, 0.0);

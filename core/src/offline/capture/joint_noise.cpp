@@ -8,11 +8,11 @@ namespace {
 
 constexpr double kLimbEndM = 0.15;
 
-// A filter for joints that vibrate. Its mean reaches to two standard deviations.
+// A filter for noisy joint rotations: a median, then a Gaussian mean cut off at two deviations.
 struct NoiseFilter {
-  double least_rad_s2;  // Joints with smaller angular accelerations are not filtered.
-  double median_reach_s;
-  double deviation_s;  // Standard deviation of the weights of the mean.
+  double least_rad_s2;    // Joints with smaller angular accelerations are not filtered.
+  double median_reach_s;  // Half of the window of the median.
+  double deviation_s;     // Standard deviation of the weights of the mean.
 };
 constexpr NoiseFilter kLimbEndFilter = {1000.0, 1.0 / 30, 0.025};
 constexpr NoiseFilter kAnkleFilter = {2000.0, 0.0, 0.010};
@@ -43,7 +43,7 @@ bool IsAnkle(const Skeleton& skeleton, int joint) {
 // The rotations of a joint in successive frames.
 using RotationTrack = std::vector<Quat>;
 
-// The rotations around a frame.
+// The rotations of a track that are at most `reach` frames before or after a frame.
 class Window {
  public:
   Window(const RotationTrack& track, int frame, int reach)
@@ -52,7 +52,7 @@ class Window {
         begin_(std::max(frame - reach, 0)),
         end_(std::min(frame + reach + 1, static_cast<int>(track.size()))) {}
 
-  // Returns the rotation that differs least from all others.
+  // Returns the rotation with the smallest sum of angles to all others.
   [[nodiscard]] Quat Median() const {
     Quat best = At(frame_);
     double least = HUGE_VAL;

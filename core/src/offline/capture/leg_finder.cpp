@@ -106,8 +106,8 @@ double LowestOf(const Pose& pose, const std::vector<int>& chain, const DVec3& up
   return lowest;
 }
 
-// Returns the direction in which the legs carry the body, one of the six axes. Empty if they do
-// not: they point nowhere, or other joints are lower than their ends in most poses.
+// Returns the axis that points from the ends of the legs up to the hips. Empty if the legs do not
+// carry the body: they do not point down, or other joints are lower than their ends in most poses.
 std::optional<DVec3> CarryingDirection(const FigureShape& figure, std::span<const Pose> poses,
                                        const LimbPair& pair) {
   DVec3 sum(0.0);
@@ -138,8 +138,8 @@ std::optional<DVec3> CarryingDirection(const FigureShape& figure, std::span<cons
   return up;
 }
 
-// Returns true if the ends of `other` are as low as those of `legs`: in the rest pose if that
-// stands, else in most poses of the motion.
+// Returns true if the ends of `other` are as low as those of `legs`: in the rest pose if the figure
+// stands in it, else in most poses of the motion.
 bool ReachesTheGround(const FigureShape& figure, const LimbPair& legs, const LimbPair& other,
                       const DVec3& up) {
   const auto reaches = [&](const Pose& pose) {
@@ -255,8 +255,8 @@ bool FindLegsByName(const FigureShape& figure, FoundLegs& legs) {
   return found;
 }
 
-// Returns true if names identify a further leg that stands at another place than those found. Rigs
-// may contain copies of the same leg, which are no further legs.
+// Returns true if names identify a further leg at another place than the legs in `legs`. Rigs may
+// contain copies of the same leg, which do not count as further legs.
 bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
   const Pose& pose = PosesOf(figure).front();
   for (const Side side : {Side::kLeft, Side::kRight}) {
@@ -280,9 +280,9 @@ bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
   return false;
 }
 
-// Returns true if the hands stand on the ground like the feet while the trunk is horizontal: in the
-// rest pose if it stands, else in most poses of the motion. The rest pose of rigs whose bones are
-// all parallel does not stand, since its trunk points down like its legs.
+// Returns true if the hands are on the ground like the feet while the trunk is horizontal: in the
+// rest pose if the figure stands in it, else in most poses of the motion. In the rest pose of rigs
+// whose bones are all parallel, the figure does not stand: its trunk points down like its legs.
 bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
   int hands[2] = {-1, -1};
   for (int j = 0; j < static_cast<int>(figure.joints.size()); ++j) {
@@ -294,14 +294,14 @@ bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
     if (hand < 0) hand = j;
   }
   if (hands[0] < 0 || hands[1] < 0) return false;
-  double length = 0.0;  // Of both legs.
+  double length = 0.0;  // Sum of the lengths of both legs.
   for (const FoundLeg& leg : legs.legs) length += ChainLength(figure.joints, leg.hip, leg.ankle);
   const auto legs_up = [&](const Pose& pose) {
     DVec3 sum(0.0);
     for (const FoundLeg& leg : legs.legs) sum += pose[Index(leg.hip)] - pose[Index(leg.ankle)];
     return sum;
   };
-  // The shoulder is where the arm leaves the trunk, at most as high as the neck.
+  // The trunk ends where the arms begin, at most at the height of the neck.
   const auto trunk_of = [&](const Pose& pose) {
     DVec3 trunk(0.0);
     for (const int hand : hands) {

@@ -19,7 +19,7 @@ constexpr double kMaxRiseM = 0.06;
 constexpr double kMaxTurnRad = 0.2;
 constexpr double kMaxWidthM = 0.4;
 // The ball of the foot rises by 0.02 to 0.09 m in a walk. It rises further in steps over or onto
-// things.
+// obstacles.
 constexpr double kPlainLiftM = 0.11;
 // Strides whose length differs from the median by more than this are not averaged.
 constexpr double kSameLengthM = 0.12;
@@ -66,7 +66,7 @@ bool IsStraightStride(const Stride& stride, Foot moving) {
          std::fabs(stride.example->heading_change_rad) < kMaxTurnRad;
 }
 
-// Returns the straight strides of a foot, from the first group that contains some: groups of
+// Returns the straight strides of a foot, from the first group that contains any. Groups of
 // straight steps come first.
 std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
   for (const RawGroup& group : library.groups) {
@@ -110,8 +110,8 @@ PostureSample SampleAround(const StrideModel& model, double time_s) {
 
 // Smooths the body over time, but not the feet. Both ends of the stride do not change.
 void SmoothBody(double window_s, StrideModel& model) {
-  // Samples on each side of a point. They are evenly spaced in time, which the points are not, so
-  // that even motion remains even.
+  // Samples on each side of a point. The points are not evenly spaced in time, but the samples are,
+  // so that uniform motion remains uniform.
   constexpr int kSide = 8;
   const StrideModel rough = model;
   for (std::size_t p = 1; p + 1 < rough.points.size(); ++p) {
@@ -165,7 +165,7 @@ StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides
   model.start_length_m /= count;
   model.end_length_m /= count;
   model.width_m /= count;
-  // A mean of few strides contains what happened in one of them by chance.
+  // The fewer strides are averaged, the more individual variation remains, so smooth more.
   SmoothBody(kRoughWindowS / std::sqrt(count), model);
   return model;
 }

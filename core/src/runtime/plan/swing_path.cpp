@@ -8,13 +8,13 @@
 namespace stridewire {
 namespace {
 
-// A swinging foot clears the ground within kPassingRadiusM by up to kClearanceM, but is lifted by
-// at most kMaxLiftM.
+// In mid-swing, a foot is at least kClearanceM above the highest ground within kPassingRadiusM,
+// unless this would lift it by more than kMaxLiftM.
 constexpr double kClearanceM = 0.037;
 constexpr double kPassingRadiusM = 0.02;
-// A foot that is lifted by more than kNoticeableLiftM may be ahead of its path or behind it by up
-// to kMaxAdvanceM. Swings are compared by their peaks, by their steepness in metres per swing times
-// kSteepnessWeight, and by the advance times kAdvanceCost.
+// If the foot is lifted by more than kNoticeableLiftM, it may be up to kMaxAdvanceM ahead of its
+// path or behind it. The cost of a swing is the sum of its peak, its steepness (metres per swing)
+// times kSteepnessWeight, and its advance times kAdvanceCost.
 constexpr double kNoticeableLiftM = 0.01;
 constexpr double kMaxAdvanceM = 0.12;
 constexpr double kSteepnessWeight = 0.2;
@@ -47,7 +47,7 @@ double SwingCost(const SwingValues& heights_m, double from_m, double to_m) {
 }
 
 // Returns the lifts with the lowest cost whose sum is at least `lacks_m` at each sample of the
-// swing, as far as kMaxLiftM allows. `heights_m` are the heights of the foot without lifts.
+// swing. No lift exceeds kMaxLiftM. `heights_m` are the heights of the foot without lifts.
 SwingLifts LowestLifts(const SwingValues& lacks_m, const SwingValues& heights_m, double from_m,
                        double to_m) {
   constexpr int kMiddleLifts = 16;

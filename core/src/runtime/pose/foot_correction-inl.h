@@ -3,9 +3,9 @@
 //
 // plant_feet.cpp and foot_plant-inl.h include this file inside a namespace, so it has no include
 // guard. Before that, they define STRIDEWIRE_INLINE and the arithmetic of their number type:
-// Constant, Select, Min, Max, DivideBy, WrapAngle, EaseOut and EaseOutSlope. Two operations have
-// another order of additions per number type, so that movements keep the bits they always had:
-// OnePlusTwice(x) = 1 + 2x and AddBoth(a, b, c) = a + b + c.
+// Constant, Select, Min, Max, DivideBy, WrapAngle, EaseOut and EaseOutSlope. The order of additions
+// in OnePlusTwice(x) = 1 + 2x and AddBoth(a, b, c) = a + b + c differs between the number types.
+// Another order would change the poses of existing movements in their last bits.
 //
 // A `Timing` has the members time_s, start_offset_s, duration_s, ease_out_s and extra_turn, and the
 // functions OfDuration(x) = x / duration_s and OfEaseOut(x) = x / ease_out_s.

@@ -27,10 +27,10 @@ class PoseRows {
  public:
   using Avatars = std::shared_ptr<const std::vector<AvatarId>>;
 
-  /// Removes all rows and starts a tick. `info` has part 0 of 1. `avatars` is not null, ascending
-  /// and without 0. Compact modes need `codec`, which must outlive all calls of Add. Fails with the
-  /// errors of Check(PoseBatch), and with kInvalidArgument if the codec is missing or has another
-  /// number of joints.
+  /// Removes all rows and starts a tick. In `info`, `part` must be 0 and `parts` 1. `avatars` must
+  /// not be null; its ids must be ascending and above 0. Compact modes need `codec`, which must
+  /// outlive all calls of Add. Fails with the errors of Check(PoseBatch), and with kInvalidArgument
+  /// if the codec is missing or has another number of joints.
   [[nodiscard]] Status Begin(const PoseBatchInfo& info, Avatars avatars,
                              const CompactCodec* codec = nullptr);
 
@@ -49,9 +49,8 @@ class PoseRows {
   [[nodiscard]] const PoseBatchInfo& info() const { return info_; }
   [[nodiscard]] const Avatars& avatars() const { return avatars_; }
   [[nodiscard]] std::size_t size() const { return flags_.size(); }  ///< Number of rows.
-  [[nodiscard]] std::size_t pose_count() const {
-    return pose_count_;
-  }  ///< Number of rows that are not empty.
+  /// Returns the number of rows that are not empty.
+  [[nodiscard]] std::size_t pose_count() const { return pose_count_; }
   [[nodiscard]] std::uint8_t flags(std::size_t row) const { return flags_[row]; }
   [[nodiscard]] bool has_pose(std::size_t row) const { return begins_[row] < begins_[row + 1]; }
   [[nodiscard]] std::span<const std::byte> poses(std::size_t first, std::size_t last) const {
@@ -63,8 +62,8 @@ class PoseRows {
   Avatars avatars_;
   std::vector<std::uint8_t> flags_;
   std::vector<std::size_t> begins_;
-  std::vector<std::byte>
-      bytes_;  // It may be longer than the rows, so that it is not cleared for every tick.
+  // It may be longer than the rows together: it never shrinks, so that it need not be cleared.
+  std::vector<std::byte> bytes_;
   std::size_t pose_count_ = 0;
 
   std::span<std::byte> Room(std::size_t begin, std::size_t length);
@@ -72,8 +71,8 @@ class PoseRows {
   CompactCodec::Block block_;
 };
 
-/// Copies rows into frames. Reuses its memory, so that after the first frames only `frame`
-/// allocates. Not thread-safe.
+/// Copies rows into frames. Reuses its memory: after the first frames, it allocates only `frame`.
+/// Not thread-safe.
 class PoseBatchComposer {
  public:
   explicit PoseBatchComposer(const FrameLimits& limits = {});
