@@ -87,10 +87,9 @@ Status AvatarSimulation::SetFootPlanting(bool enabled) {
 
 void AvatarSimulation::AddEvent(const AvatarEvent& event) {
   STRIDEWIRE_CHECK(events_.size() < max_events_);
-  // Rounding may set time_s_ back by one bit after the events of dropped requests.
-  const double time_s = events_.empty() ? time_s_ : std::max(time_s_, events_.back().time_s);
+  STRIDEWIRE_CHECK(events_.empty() || events_.back().time_s <= time_s_);
   AvatarEvent& added = events_.emplace_back(event);
-  added.time_s = time_s;
+  added.time_s = time_s_;
   if (event.type == AvatarEventType::kStarted) started_ = added;
   if (event.type == AvatarEventType::kRejected && event.outcome == RequestOutcome::kNone) {
     added.outcome = RequestOutcome::kRejected;
@@ -196,6 +195,10 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   change_ = std::exchange(next_change_, {});
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
+  const auto advance_clock = [&] {
+    // Where no time has passed, the rounded difference may lie one bit before the clock.
+    time_s_ = std::max(time_s_, end_s - left_s);
+  };
   for (;;) {
     STRIDEWIRE_CHECK(left_s >= 0.0);
     STRIDEWIRE_CHECK(!(is_moving_ && is_in_stand_));
@@ -213,7 +216,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
         break;
       }
       left_s = before_s + left_s - duration_s;
-      time_s_ = end_s - left_s;
+      advance_clock();
       ReportFootStrikes(before_s, duration_s);
       FinishMovement(duration_s);
     } else if (is_in_stand_) {
@@ -222,7 +225,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
         break;
       }
       left_s -= stand_left_s_;
-      time_s_ = end_s - left_s;
+      advance_clock();
       FinishStand();
     }
     if (!may_change || !StartNext(scratch)) break;
