@@ -17,6 +17,8 @@ struct NoiseFilter {
 constexpr NoiseFilter kLimbEndFilter = {1000.0, 1.0 / 30, 0.025};
 constexpr NoiseFilter kAnkleFilter = {2000.0, 0.0, 0.010};
 constexpr double kAccelerationPercentile = 0.99;
+// Largest number of samples of a window on each side of its frame.
+constexpr int kMaxReachSamples = 8;
 
 // Returns the length of the body beyond a joint.
 double ReachBeyond(const Skeleton& skeleton, int joint) {
@@ -43,22 +45,24 @@ bool IsAnkle(const Skeleton& skeleton, int joint) {
 // The rotations of a joint in successive frames.
 using RotationTrack = std::vector<Quat>;
 
-// The rotations of a track that are at most `reach` frames before or after a frame.
+// The rotations of a track that are at most `reach` frames before or after a frame, or every n-th
+// of them. The number of samples is limited, because the median compares all pairs.
 class Window {
  public:
   Window(const RotationTrack& track, int frame, int reach)
       : track_(track),
         frame_(frame),
-        begin_(std::max(frame - reach, 0)),
+        stride_(std::max(1, (reach + kMaxReachSamples - 1) / kMaxReachSamples)),
+        begin_(frame - std::min(reach, frame) / stride_ * stride_),
         end_(std::min(frame + reach + 1, static_cast<int>(track.size()))) {}
 
   // Returns the rotation with the smallest sum of angles to all others.
   [[nodiscard]] Quat Median() const {
     Quat best = At(frame_);
     double least = HUGE_VAL;
-    for (int f = begin_; f < end_; ++f) {
+    for (int f = begin_; f < end_; f += stride_) {
       double sum = 0.0;
-      for (int g = begin_; g < end_; ++g) sum += AngleBetween(At(f), At(g));
+      for (int g = begin_; g < end_; g += stride_) sum += AngleBetween(At(f), At(g));
       if (sum < least) {
         least = sum;
         best = At(f);
@@ -70,7 +74,7 @@ class Window {
   // Returns the mean with Gaussian weights. `deviation` is in frames.
   [[nodiscard]] Quat Mean(double deviation) const {
     Quat sum(0.0f, 0.0f, 0.0f, 0.0f);
-    for (int f = begin_; f < end_; ++f) {
+    for (int f = begin_; f < end_; f += stride_) {
       const double distance = (f - frame_) / deviation;
       const auto weight = static_cast<float>(std::exp(-0.5 * distance * distance));
       sum += At(f) * (Dot(At(f), At(frame_)) < 0.0f ? -weight : weight);
@@ -83,6 +87,7 @@ class Window {
 
   const RotationTrack& track_;
   int frame_;
+  int stride_;
   int begin_;
   int end_;
 };

@@ -69,6 +69,15 @@ TEST_F(RemoveJointNoise, RemovesNoiseAndSingleFlipsFromToes) {
   }
 }
 
+TEST_F(RemoveJointNoise, RemovesNoiseAtAHighFrameRate) {
+  SCOPED_TRACE(seed_);
+  capture_.clip.fps = 1000.0;
+  SetNoise(toes_, 0.05);
+  const double before = Squares(toes_);
+  EXPECT_THAT(Remove(), testing::Contains(toes_));
+  EXPECT_LT(Squares(toes_), 0.2 * before);
+}
+
 TEST_F(RemoveJointNoise, SmoothsOnlyJointsThatVibrate) {
   SCOPED_TRACE(seed_);
   SetNoise(ankle_, 0.01);
