@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from . import _abi
+from . import _abi, _load
 from ._types import (Event, EventType, Foot, Interrupt, Kind, Outcome, Pose, PoseKind, PoseMode,
                      Recording, Skeleton, StridewireError)
 
-_library = _abi.load()
+_library = _load.load()
 _STEP, _JUMP, _STAND, _WALK = range(4)
 _NO_TICK = 2**64 - 1
 _BUFFER_TOO_SMALL = 150
@@ -208,6 +208,7 @@ class World:
         self._handle = handle
         self._skeleton: Skeleton | None = None
         self._rotations = np.empty((_abi.MAX_JOINTS, 4), np.float32)
+        self._rotations_pointer = self._rotations.ctypes.data_as(c.POINTER(c.c_float))
         self._ended: dict[int, Event] = {}
         self._open: set[int] = set()
         client._watchers.append(self._watch)
@@ -384,7 +385,7 @@ class World:
         return self._skeleton
 
     def _fill(self, function: Callable[..., int], avatar: int, *arguments: Any) -> Pose | None:
-        pose = _abi.stridewire_pose(rotations_xyzw=self._rotations.ctypes.data,
+        pose = _abi.stridewire_pose(rotations_xyzw=self._rotations_pointer,
                                     joint_capacity=len(self._rotations))
         _check(function(self.client._handle, self._handle, avatar, *arguments, c.byref(pose)))
         if pose.kind == PoseKind.MISSING:
