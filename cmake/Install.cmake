@@ -64,3 +64,7 @@ set(STRIDEWIRE_PC_PREFIX "\${pcfiledir}/${up_to_prefix}")
 configure_file(client_sdk/stridewire-client.pc.in stridewire-client.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/stridewire-client.pc
         DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT client)
+
+# The C# package needs the shared client library only.
+install(DIRECTORY client_sdk/unity/ DESTINATION ${CMAKE_INSTALL_DATADIR}/stridewire/unity
+        COMPONENT client)

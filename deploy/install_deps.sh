@@ -39,6 +39,8 @@ tests=(
   libgmock-dev
   libgtest-dev
   librapidcheck-dev
+  mono-mcs  # A test compiles and runs the C# package.
+  mono-runtime
   pkgconf  # A test compiles a C program with the flags of the installed package.
   python3-numpy  # The Python package needs it; a test installs the package with pip.
   python3-pip
