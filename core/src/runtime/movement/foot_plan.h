@@ -47,7 +47,7 @@ struct FootTrajectory {
   /// Ground normals at `from` and `to`.
   std::array<Vec3, 2> normals{Vec3(0.0f, 1.0f, 0.0f), Vec3(0.0f, 1.0f, 0.0f)};
   /// Additional heights early, in the middle and late in the swing, to clear the ground. Each is
-  /// the peak of a curve that fades in and out (LiftShare).
+  /// the peak of a curve that fades in and out (LiftShare). The one in the middle may be negative.
   std::array<double, 3> lift_m{};
   /// Horizontal offset in the middle of the swing, to pass the other foot and the edges of treads.
   DVec3 aside_m = DVec3(0.0);

@@ -12,6 +12,11 @@ namespace {
 // unless this would lift it by more than kMaxLiftM.
 constexpr double kClearanceM = 0.037;
 constexpr double kPassingRadiusM = 0.02;
+// The middle of a swing is lowered by at most what the swing lacks elsewhere or, if that is more,
+// this share of the difference in height between its footprints, but never by more than
+// kMaxMiddleSinkM.
+constexpr double kMiddleSinkPerClimb = 0.5;
+constexpr double kMaxMiddleSinkM = 0.2;
 // If the foot is lifted by more than kNoticeableLiftM, it may be up to kMaxAdvanceM ahead of its
 // path or behind it. The cost of a swing is the sum of its peak, its steepness (metres per swing)
 // times kSteepnessWeight, and its advance times kAdvanceCost.
@@ -47,20 +52,28 @@ double SwingCost(const SwingValues& heights_m, double from_m, double to_m) {
 }
 
 // Returns the lifts with the lowest cost whose sum is at least `lacks_m` at each sample of the
-// swing. No lift exceeds kMaxLiftM. `heights_m` are the heights of the foot without lifts.
+// swing. No lift exceeds kMaxLiftM. `heights_m` are the heights of the foot without lifts. Where
+// `lacks_m` is negative, the foot has more room than it needs.
 SwingLifts LowestLifts(const SwingValues& lacks_m, const SwingValues& heights_m, double from_m,
                        double to_m) {
-  constexpr int kMiddleLifts = 16;
+  constexpr int kMiddleLifts = 24;
   std::array<SwingValues, 3> shares;
   for (std::size_t lift = 0; lift < shares.size(); ++lift) {
     std::ranges::transform(kClearanceSamples, shares[lift].begin(),
                            [lift](double part) { return LiftShare(lift, part); });
   }
-  // For each lift in the middle, the smallest early and late lifts follow from the two halves.
-  const double most_m = std::min(1.5 * std::ranges::max(lacks_m), kMaxLiftM);
+  // For each lift in the middle, the smallest early and late lifts follow from the two halves. The
+  // lift in the middle may be negative: early and late lifts also raise the foot in the middle,
+  // where it may have room.
+  const double most_lacking_m = std::max(std::ranges::max(lacks_m), 0.0);
+  const double most_m = std::min(1.5 * most_lacking_m, kMaxLiftM);
+  const double climb_m = kMiddleSinkPerClimb * std::fabs(to_m - from_m);
+  const double least_m =
+      most_lacking_m > 0.0 ? -std::min(std::max(most_lacking_m, climb_m), kMaxMiddleSinkM) : 0.0;
   SwingLifts best;
   for (int i = 0; i <= kMiddleLifts; ++i) {
-    SwingLifts lifts{.lift_m = {0.0, most_m * i / kMiddleLifts, 0.0}};
+    const double part = static_cast<double>(i) / kMiddleLifts;
+    SwingLifts lifts{.lift_m = {0.0, least_m + part * (most_m - least_m), 0.0}};
     for (std::size_t s = 0; s < kClearanceSamples.size(); ++s) {
       const std::size_t half = kClearanceSamples[s] < 0.5 ? 0 : 2;
       const double lacks = lacks_m[s] - lifts.lift_m[kMiddleLift] * shares[kMiddleLift][s];
@@ -83,7 +96,8 @@ SwingLifts LowestLifts(const SwingValues& lacks_m, const SwingValues& heights_m,
 // (FootTrajectory::aside_m).
 SwingLifts LiftsOver(const SwingSoles& soles, const FootTrajectory& trajectory,
                      const DVec3& aside_m, const Terrain& terrain) {
-  SwingValues lacks_m{};
+  SwingValues lacks_m;
+  lacks_m.fill(-HUGE_VAL);
   for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
     const double part = kClearanceSamples[i];
     const double across = 4.0 * part * (1.0 - part);
