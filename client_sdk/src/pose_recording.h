@@ -46,8 +46,9 @@ class PoseRecording {
   [[nodiscard]] double last_time_s() const { return last_time_s_; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
-  /// Computes the poses at `time_s` of all avatars for which `wants` returns true. There are none
-  /// outside the recorded time. Like PoseHistory, it does not interpolate across discontinuities.
+  /// Computes the poses at `time_s` of all avatars for which `wants` returns true. Outside the
+  /// recorded time, `out` is empty. Like PoseHistory, it does not interpolate across
+  /// discontinuities.
   void SampleAll(double time_s, const std::function<bool(protocol::AvatarId)>& wants,
                  CrowdPose& out);
 

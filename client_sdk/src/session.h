@@ -77,8 +77,8 @@ class Session : public SessionCommands {
   void Handle(const protocol::LibraryPiece& message, double now_s);
   void Handle(const protocol::AvatarState& message, double now_s);
   void Handle(const protocol::Goodbye& message, double now_s);
-  template <typename Message>
   /// Rejects messages that a server must not send.
+  template <typename Message>
   void Handle(const Message& message, double now_s);
 
   [[nodiscard]] static bool IsExpected(const Command& command, const protocol::ReplyItem& item);

@@ -126,9 +126,8 @@ class SessionState {
     bool join_answered = false;  ///< True if the application has received the REPLY to its join.
     std::deque<Command> unsent;
     std::map<protocol::SubscriptionId, Subscription> subscriptions;
-    std::map<protocol::AvatarId, protocol::Placement>
-        /// Avatars that this client has spawned, with their last base frames.
-        spawned;
+    /// Avatars that this client has spawned, with their last base frames.
+    std::map<protocol::AvatarId, protocol::Placement> spawned;
     /// Number of dropped batches in the last Lagging message.
     std::uint64_t last_dropped_batches = 0;
     std::unique_ptr<WorldView> view;

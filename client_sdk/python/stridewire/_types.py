@@ -37,7 +37,7 @@ class EventType(enum.IntEnum):
 
 
 class Outcome(enum.IntEnum):
-    """How a request ended. Every accepted request has exactly one event with another value than
+    """How a request ended. Every accepted request has exactly one event whose outcome is not
     NONE."""
 
     NONE = 0

@@ -48,7 +48,7 @@ const simdModule = Uint8Array.of(
 /** The client's session and codecs, compiled to WebAssembly. All clients share one instance. */
 class Native {
   readonly call: Exports;
-  /** What the module has written to stderr. */
+  /** Text that the module has written to stderr. */
   private log = '';
   private readonly resultsAt: number;
   private buffer = new ArrayBuffer(0);
@@ -56,7 +56,7 @@ class Native {
   private memory = new Uint8Array(0);
 
   constructor(module: WebAssembly.Module) {
-    // The module only prints broken invariants, before it stops.
+    // The module prints only if an invariant is broken, and then stops.
     const instance = new WebAssembly.Instance(module, {wasi_snapshot_preview1: {
       fd_write: (_fd: number, list: number, count: number, writtenAt: number): number => {
         const view = new DataView(this.call.memory.buffer);
@@ -78,13 +78,13 @@ class Native {
     this.resultsAt = this.call.results();
   }
 
-  /** Numbers that the last call has returned. */
+  /** The numbers in `results` that the last call has set. */
   get results(): Float64Array {
     this.refresh();
     return this.resultList;
   }
 
-  /** Text that the last call has returned. */
+  /** The text that the last call has set. */
   get text(): string {
     const {results} = this;
     // A copy, because browsers do not decode memory that can grow.
@@ -116,7 +116,7 @@ class Native {
     return bytes.length;
   }
 
-  /** Adds what the module has printed to an error of the module. */
+  /** If the module has stopped, returns an error that contains the text that it has printed. */
   explain(error: unknown): unknown {
     if (!(error instanceof WebAssembly.RuntimeError)) return error;
     const explained = new Error(`Stridewire's WebAssembly module has stopped: ${

@@ -16,7 +16,7 @@ export interface ActiveSubscription {
   message: Observe;
   /** Number in the module; 0 if the client is not connected. */
   handle: number;
-  /** Receives the reply if it was not sent yet. */
+  /** Called with the reply to an observation that has not been sent yet; otherwise null. */
   answer: ((reply: Reply) => void) | null;
 }
 
@@ -162,7 +162,7 @@ export class WorldHandle implements World {
     return count;
   }
 
-  /** Returns numbers of the module about this world, or null if it does not know the world. */
+  /** Returns the results of `world_state`, or null if the module does not know this world. */
   stateNumbers(): Float64Array | null {
     return native().call.world_state(this.session.client, this.handle) < 0 ? null
                                                                            : native().results;

@@ -138,7 +138,7 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     const auto remote = socket.remote_endpoint(error);
     if (error) return;  // The peer has closed the connection.
     auto request = parser_->release();
-    // Proxies may add to a header or write another one.
+    // A proxy may append to the header, or add another header of the same name.
     std::string forwarded;
     const auto [first, last] = request.equal_range("X-Forwarded-For");
     for (auto it = first; it != last; ++it) {

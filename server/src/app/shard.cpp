@@ -357,7 +357,7 @@ void Shard::AdoptNow(Arrival&& arrival) {
 }
 
 void Shard::DestroySession(SessionId session) {
-  // The session itself is the caller, so it is destroyed later.
+  // The session may be calling this function, so post its destruction.
   asio::post(context_, [this, session] {
     const auto it = sessions_.find(session);
     if (it == sessions_.end() || !it->second->is_ended()) return;

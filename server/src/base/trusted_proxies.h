@@ -10,7 +10,7 @@
 
 namespace stridewire::server {
 
-/// The proxies that may state on whose behalf they connect.
+/// The proxies whose X-Forwarded-For header the server believes.
 ///
 ///   client 203.0.113.7 --> proxy 10.0.0.2 --> server
 ///   X-Forwarded-For: 203.0.113.7
@@ -24,10 +24,10 @@ class TrustedProxies {
 
   /// Returns the address of the client of a connection from `peer`. `forwarded` is the content of
   /// X-Forwarded-For: addresses separated by commas, to which each proxy appends the address of its
-  /// own peer. Returns `peer` if it is not trusted. Otherwise, starting from the end of the list,
-  /// returns the first address that is not trusted. A client can write anything at the beginning of
-  /// the list, so the addresses before that one mean nothing. If an entry is not an address,
-  /// returns the address after it.
+  /// own peer. Returns `peer` if it is not trusted. Otherwise, returns the last address in the list
+  /// that is not trusted. The addresses before it mean nothing, because a client can send a header
+  /// with any addresses. If all are trusted, returns the first one. If an entry that is reached is
+  /// not an address, returns the address after it, or `peer` if it is the last entry.
   [[nodiscard]] boost::asio::ip::address ClientOf(const boost::asio::ip::address& peer,
                                                   std::string_view forwarded) const;
 

@@ -75,8 +75,8 @@ class WebSocketTransport final : public Transport {
     return false;
   }
 
-  // Browsers slow down the timers of hidden pages, so their programs send nothing for a minute. The
-  // browser itself answers a ping.
+  // Browsers slow down the timers of hidden pages, so such a page may send nothing for a minute.
+  // The browser itself answers a ping.
   void KeepAlive(std::shared_ptr<User> user) override {
     if (request_ || is_pinging_) return;
     is_pinging_ = true;

@@ -269,8 +269,8 @@ typedef struct stridewire_movement {
 /// Requests movements. An avatar may appear several times and executes its movements in order.
 /// Steps of a walk appear in events with the request id of the walk. A walk ends with FINISHED of
 /// kind STAND when the avatar has arrived, or with REJECTED if it cannot continue. Steps and jumps
-/// that are out of reach end with REJECTED, which contains the nearest one in reach. So do requests
-/// that are cancelled, replaced, or whose avatar is removed, see `outcome` of stridewire_event.
+/// that are out of reach end with REJECTED, which contains the nearest one in reach. Requests that
+/// are dropped before they are completed also end with REJECTED; see `outcome` of stridewire_event.
 ///
 /// If the library cannot walk at a requested speed, REPLY has the status OK and a `text` that
 /// states the possible speeds, and ACCEPTED has `clamped` and the nearest of them.

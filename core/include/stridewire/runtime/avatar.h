@@ -22,7 +22,7 @@ enum class AvatarEventType : std::uint8_t {
   /// A request could not be carried out: code and reason, and for a step or jump that is out of
   /// reach the nearest one. The requests queued after it are played.
   kRejected,
-  kDropped,  ///< A request was cancelled, replaced or removed: outcome and reason.
+  kDropped,  ///< A request was dropped before it was completed: outcome and reason.
 };
 
 /// How a request ended.

@@ -46,7 +46,7 @@ double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   return HorizontalDistance(pelvis, ankles) + HorizontalDistance(DVec3(*top), pelvis);
 }
 
-// Returns by how much a foot is not flat. Figures may also be still on their heels or toes, for
+// Returns how far a foot is from being flat. Figures may also be still on their heels or toes, for
 // example after a fall.
 double Tilt(const FootPaths& foot, int frame) {
   double tilt_m = 0.0;

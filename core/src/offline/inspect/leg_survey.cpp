@@ -14,8 +14,8 @@ namespace {
 // A leg is bent if its knee is further off the line from hip to ankle than this fraction of the
 // thigh, which corresponds to about 20 degrees.
 constexpr float kBent = 0.17f;
-// A foot that points along the line from hip to ankle has no direction. That of a foot which points
-// downward, as in a swing, is uncertain: a small tilt turns it far.
+// A foot that points along the line from hip to ankle has no direction. If it points downward, as
+// in a swing, its direction is uncertain, because a small tilt changes it by a large angle.
 constexpr float kLeastFootPart = 0.5f;
 constexpr float kCertainFootPart = 0.8f;
 

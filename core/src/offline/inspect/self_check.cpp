@@ -77,7 +77,7 @@ class Checker {
     return true;
   }
 
-  // Returns what the user can do if walking fails, considering the first missing prerequisite.
+  // Returns advice for the user if walking fails. It depends on the first missing prerequisite.
   [[nodiscard]] std::string WalkAdvice() const {
     const bool has_left = summary_.has_steps_of(Foot::kLeft);
     if (!has_left || !summary_.has_steps_of(Foot::kRight)) {

@@ -45,7 +45,7 @@ struct AvatarChange {
   bool operator==(const AvatarChange&) const = default;
 };
 
-/// Returns the reason that a kDropped event states, as a sentence without its full stop.
+/// Returns the reason of a kDropped event: a sentence without a full stop.
 [[nodiscard]] const char* DropReason(RequestOutcome outcome);
 
 /// Simulates one avatar: base frame, queue of requests, current movement, displayed pose.
@@ -80,12 +80,12 @@ class AvatarSimulation {
   /// continues to its end. A walk in progress is dropped after its current step.
   int CancelQueue();
 
-  /// Drops the current movement's request and the queue, because the avatar is about to be removed
-  /// or moved. The caller must then do that.
+  /// Drops the queue and the request of the current movement. Call it only before removing or
+  /// moving the avatar, because the movement itself continues.
   void DropAll(RequestOutcome outcome);
 
-  /// Returns the requests that were dropped since the last Advance, and does not report them in
-  /// events(). Those that are not taken become events of the next Advance.
+  /// Returns and forgets the requests that were dropped since the last Advance. The next Advance
+  /// reports those that were not taken as events.
   [[nodiscard]] std::vector<DroppedRequest> TakeDropped() { return std::exchange(dropped_, {}); }
 
   /// Starts, changes or ends a layer with the next Advance. The legs and the root keep exactly the

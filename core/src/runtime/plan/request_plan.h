@@ -78,7 +78,7 @@ inline constexpr double kHurriedRate = 1.6;
                                                   const StepRequest& request, const FootState& feet,
                                                   Foot last_moved, bool standing);
 
-/// The origin of a footprint. A walk can choose another one if the library has no step that fits.
+/// Origin of a footprint: a request, or a walk, which can choose another one if no step fits.
 enum class FootprintUse { kRequested, kWalk };
 
 /// Plans a step to a footprint in world space, by translating it to a request relative to the foot

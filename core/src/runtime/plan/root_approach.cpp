@@ -9,12 +9,12 @@
 namespace stridewire {
 namespace {
 
-// The blend from the previous pose accelerates the root by at most kMaxAccelerationMPerS2, as far
-// as that is possible within kMaxApproachS. In captures of starts and stops, the whole acceleration
-// is 4 to 4.6 m/s2.
+// The blend from the previous pose accelerates the root by at most kMaxAccelerationMPerS2, unless
+// it would then take longer than kMaxApproachS. In captures of starts and stops, the acceleration
+// of blend and movement together is 4 to 4.6 m/s2.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
 constexpr double kMaxApproachS = 0.8;
-// On terrain it is shorter, because a leg that climbs or descends reaches less far.
+// On terrain the blend is shorter, because a leg that climbs or descends reaches less far.
 constexpr double kMaxTerrainApproachS = 0.35;
 constexpr double kApproachStepS = 0.02;
 
@@ -28,8 +28,8 @@ double PeakAcceleration(const DVec3& offset_m, const DVec3& offset_m_s, double o
   return std::max(HorizontalLength(bend + 2.0 * slope), HorizontalLength(bend + slope));
 }
 
-// Returns the shortest time in which the root can go from `offset_m` with velocity `offset_m_s` to
-// rest at 0, but at least `least_s`.
+// Returns the shortest time from `least_s` to `most_s` in which the root can go from `offset_m`
+// with velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2.
 double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least_s, double most_s) {
   double over_s = least_s;
   while (over_s < most_s &&

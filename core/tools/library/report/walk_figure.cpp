@@ -69,7 +69,7 @@ Expected<Figure> WalkFigure(const std::shared_ptr<const MotionLibrary>& library,
   const Vec3 way = clip.root_positions_m.back() - clip.root_positions_m.front();
   const bool from_front = std::fabs(way.x) > std::fabs(way.z);
   const int ahead = from_front ? 0 : 2;
-  // The vertical axis of the picture from above.
+  // Returns the coordinate that is drawn upwards in the view from above.
   const auto up = [&](const auto& p) { return from_front ? -double{p[2]} : double{p[0]}; };
   const auto point = [&](const auto& p) { return Number(p[ahead]) + " " + Number(up(p)) + "\n"; };
   for (int f = 0; f < clip.frame_count(); ++f) {
