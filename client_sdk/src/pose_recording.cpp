@@ -24,7 +24,7 @@ ConstPoseSpan PoseRecording::Decoded::pose(std::size_t i) const {
 
 void PoseRecording::Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
                         const std::shared_ptr<const protocol::CompactCodecs>& codecs) {
-  if (length_s_ <= 0.0 || max_bytes_ == 0) return;
+  if (!enabled()) return;
   const protocol::PoseBatchInfo& info = batch.info;
   // Streams of regions have negative keys, one per mode and shard.
   constexpr std::int32_t kModes = 8;

@@ -16,8 +16,8 @@
 
 namespace stridewire::client {
 
-/// The last seconds of a world as received, for replay. It stores the encoded batches and decodes
-/// only what is sampled.
+/// The last seconds of a world for replay. It stores encoded batches and decodes only what is
+/// sampled.
 ///
 ///   stream (shard, or mode and shard of a region)
 ///     ticks:    oldest ... [info, epoch, parts] ... newest     encoded
@@ -31,6 +31,8 @@ class PoseRecording {
   /// which disables it.
   PoseRecording(double length_s, std::size_t max_bytes)
       : length_s_(length_s), max_bytes_(max_bytes) {}
+
+  [[nodiscard]] bool enabled() const { return length_s_ > 0.0 && max_bytes_ > 0; }
 
   /// Adds a copy of a batch. Poses of different epochs are not interpolated. `codecs` decodes its
   /// poses if they are compact. If a tick of a shard arrives in two modes, only the first is

@@ -153,11 +153,69 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseS
 void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                        ConstPoseSpan pose) {
   if (stamp.tick % replica_every_n_ticks_ != 0 || !Wants(avatar)) return;
-  if (Track* track = FindOrAddTrack(avatar); track != nullptr) {
-    Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose, *replica_counts_);
-  } else {
+  Track* track = FindOrAddTrack(avatar);
+  if (track == nullptr) {
     ++replica_counts_->refused;
+    return;
   }
+  Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose, *replica_counts_);
+  if (!recording_.enabled()) return;
+  evaluated_.avatars.push_back(avatar);
+  evaluated_.flags.push_back(
+      static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
+                                (stamp.standing ? protocol::kPoseStanding : 0)));
+  evaluated_.roots_m.push_back(pose.root_position_m);
+  evaluated_.rotations.insert(evaluated_.rotations.end(), pose.rotations.begin(),
+                              pose.rotations.end());
+}
+
+void WorldView::RecordEvaluated(const protocol::Movements& movements) {
+  const std::size_t count = evaluated_.avatars.size();
+  if (count == 0) return;
+  const std::size_t joints = skeleton_.joints.size();
+  const auto rotations = [&](std::size_t i) {
+    return std::span<const Quat>(evaluated_.rotations).subspan(i * joints, joints);
+  };
+  protocol::PoseMode mode = protocol::PoseMode::kCompact;
+  const protocol::CompactCodec* codec = codecs_ ? codecs_->Find(mode) : nullptr;
+  bool fits = codec != nullptr;
+  if (fits) {
+    const std::size_t bytes = codec->pose_bytes();
+    encoded_.resize(count * bytes);
+    for (std::size_t first = 0; first < count; first += protocol::CompactCodec::kBlock) {
+      const std::size_t size = std::min(protocol::CompactCodec::kBlock, count - first);
+      block_.Clear();
+      for (std::size_t i = 0; i < size; ++i) {
+        block_.Add(evaluated_.roots_m[first + i], rotations(first + i));
+      }
+      codec->Encode(block_);
+      for (std::size_t i = 0; i < size; ++i) {
+        fits &= block_.fits(i);
+        block_.CopyBytes(i, std::span(encoded_).subspan((first + i) * bytes, bytes));
+      }
+    }
+  }
+  if (!fits) {
+    // A pose is outside the range of the compact codes.
+    mode = protocol::PoseMode::kQuantised;
+    const std::size_t bytes = protocol::PoseBytes(mode, joints);
+    encoded_.resize(count * bytes);
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto out = std::span(encoded_).subspan(i * bytes, bytes);
+      if (!protocol::EncodePose(mode, evaluated_.roots_m[i], rotations(i), out)) return;
+    }
+  }
+  recording_.Add({.info = {.world = movements.world,
+                           .shard = movements.shard,
+                           .part = recorded_part_++,
+                           .tick = movements.tick,
+                           .server_time_s = movements.server_time_s,
+                           .mode = mode,
+                           .joint_count = static_cast<std::uint16_t>(joints)},
+                  .avatars = evaluated_.avatars,
+                  .flags = evaluated_.flags,
+                  .poses = encoded_},
+                 epoch_, codecs_);
 }
 
 Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replicas,
@@ -170,7 +228,9 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
   newest_time_s_ = std::max(newest_time_s_, movements.server_time_s);
   replica_every_n_ticks_ = std::max<std::uint64_t>(every_n_ticks, 1);
   replica_counts_ = &counts;
+  evaluated_.Resize(0, skeleton_.joints.size());
   const Status status = replicas.Apply(movements, *this);
+  RecordEvaluated(movements);
   EraseGone(movements.server_time_s);
   return status;
 }

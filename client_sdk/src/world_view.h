@@ -79,8 +79,8 @@ class WorldView : public PoseSink {
   /// with kLimitExceeded for too many shards, and with kMalformed if the ticks of a shard decrease.
   Status Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
 
-  /// Evaluates movement records with `replicas` and stores the poses of ticks that `every_n_ticks`
-  /// divides. Fails with the errors of ReplicaSet::Apply, and with kShapeMismatch.
+  /// Evaluates movement records with `replicas`, and stores and records the poses of ticks that
+  /// `every_n_ticks` divides. Fails with the errors of ReplicaSet::Apply, and with kShapeMismatch.
   Status Apply(const protocol::Movements& movements, ReplicaSet& replicas,
                std::uint64_t every_n_ticks, Counts& counts);
 
@@ -108,7 +108,8 @@ class WorldView : public PoseSink {
     }
   }
 
-  /// The received batches of the last seconds. Clear also clears them.
+  /// The poses of the last seconds: the received batches, and evaluated poses in compact form.
+  /// Clear also clears them.
   [[nodiscard]] PoseRecording& recording() { return recording_; }
 
   /// Samples all avatars at a server time. Adds the number of poses after the newest received pose
@@ -149,6 +150,9 @@ class WorldView : public PoseSink {
   Track* FindOrAddTrack(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
 
+  /// Records the poses in `evaluated_`, which a message with movements has produced.
+  void RecordEvaluated(const protocol::Movements& movements);
+
   /// Must be called after the last part of a batch. Marks avatars of its shard and mode that were
   /// not in it as gone.
   void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
@@ -176,6 +180,11 @@ class WorldView : public PoseSink {
   // Interval of poses in ticks, as requested. Set while Apply(Movements) runs.
   std::uint64_t replica_every_n_ticks_ = 1;
   Counts* replica_counts_ = nullptr;  // Counters to update. Set while Apply(Movements) runs.
+  // The poses of one message for the recording, in the order of evaluation, and their encoding.
+  CrowdPose evaluated_;
+  protocol::CompactCodec::Block block_;
+  std::vector<std::byte> encoded_;
+  std::uint16_t recorded_part_ = 0;  // Distinguishes messages of the same tick in the recording.
 };
 
 }  // namespace stridewire::client

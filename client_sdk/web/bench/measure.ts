@@ -4,6 +4,7 @@ import {Client} from '../src/client';
 import {createCrowdPose} from '../src/pose_buffers';
 import type {CrowdPose, PoseMode} from '../src/types';
 import {decodeMessage} from '../src/testing';
+import {MessageType} from '../generated/messages';
 import {ServerProcess, until} from '../test/support/server_process';
 
 function median(values: number[]): number {
@@ -37,7 +38,8 @@ async function measure(mode: PoseMode, count: number): Promise<void> {
       super(url);
       this.on('message', (data) => {
         if (data instanceof ArrayBuffer && data.byteLength > 40 && frames.length < 60 &&
-            new DataView(data).getUint16(6, true) === 67) {
+            [MessageType.PoseBatch as number, MessageType.Movements].includes(
+                new DataView(data).getUint16(6, true))) {
           frames.push(data);
         }
       });
@@ -78,6 +80,8 @@ async function measure(mode: PoseMode, count: number): Promise<void> {
     avatars: count,
     joints: world.skeleton!.jointCount,
     bytesPerS: Math.round((last.bytesReceived - first.bytesReceived) / seconds),
+    bytesPerPose: Number(((last.poseBytesReceived - first.poseBytesReceived) /
+                          (last.posesReceived - first.posesReceived)).toFixed(2)),
     posesPerS: Math.round((last.posesReceived - first.posesReceived) / seconds),
     decodeNsPerPose: Math.round(last.decodeNsPerPose),
     frameCheckUs: Number(checked.toFixed(2)),
@@ -90,7 +94,9 @@ async function measure(mode: PoseMode, count: number): Promise<void> {
   await server.kill();
 }
 
-for (const mode of ['full', 'quantised'] as const) {
+const modes = process.argv.length > 2 ? [process.argv[2] as PoseMode]
+                                      : ['full', 'quantised', 'movement'] as const;
+for (const mode of modes) {
   for (const count of [1, 100, 1000]) await measure(mode, count);
 }
 process.exit(0);

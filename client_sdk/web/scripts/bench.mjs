@@ -15,6 +15,7 @@ await build({
   target: 'node18',
   define: {STRIDEWIRE_ROOT: JSON.stringify(fileURLToPath(new URL('../../..', import.meta.url)))},
 });
-const run = spawnSync(process.execPath, ['--expose-gc', `${folder}/build/measure.mjs`],
+const run = spawnSync(process.execPath, ['--expose-gc', `${folder}/build/measure.mjs`,
+                                          ...process.argv.slice(2)],
                       {stdio: 'inherit'});
 process.exit(run.status ?? 1);

@@ -1,3 +1,4 @@
+import {defaultLibraryCache} from './library_cache';
 import {Session} from './session';
 import {defaultOptions} from './session_options';
 import {Status} from './status';
@@ -66,7 +67,8 @@ export class Client {
     this.webSocket = socketClass;
     this.now = now ?? (() => performance.now());
     this.session = new Session(
-        {...defaultOptions, seed: Math.floor(Math.random() * 2 ** 32), ...given},
+        {...defaultOptions, seed: Math.floor(Math.random() * 2 ** 32),
+         libraryCache: defaultLibraryCache(), ...given},
         () => performance.now());
     this.session.wake = () => this.work();
     this.session.socketBytes = () => this.socket?.bufferedAmount ?? 0;

@@ -32,6 +32,19 @@ export interface WebSocketLike {
   close(): void;
 }
 
+/**
+ * Keeps the files of motion libraries, so that the client need not fetch them again. The client
+ * checks the hash of each file. If a promise rejects, or `load` takes longer than 2 s, the client
+ * continues without the cache.
+ */
+export interface LibraryCache {
+  /** Returns the file of a library; null if the cache does not contain it. `hash` has 32
+   * hexadecimal digits. */
+  load(hash: string): Promise<Uint8Array | null>;
+  /** Stores the file of a library. It replaces a file of the same hash, which may be damaged. */
+  store(hash: string, file: Uint8Array): Promise<void>;
+}
+
 /** Options of a client. Only `url` is required. */
 export interface ClientOptions {
   /** Address of the server: `ws://host:port/stream`, or the same with `wss`. */
@@ -65,6 +78,12 @@ export interface ClientOptions {
   maxRecordingBytes?: number;
   /** Limit of events in one world's recording, 1 to 2^24. Default 65536. */
   maxRecordedEvents?: number;
+  /**
+   * Cache for the motion libraries of movement mode. `null`: no cache. Default: IndexedDB, shared
+   * by all clients of the page's origin, or no cache where IndexedDB is missing. It keeps at most
+   * 16 libraries of 64 MiB in total and removes those that were not used for the longest time.
+   */
+  libraryCache?: LibraryCache | null;
   /** Time limit for opening the WebSocket, and again for the handshake, 0.1 to 600. Default 5. */
   connectTimeoutS?: number;
   /** Time between pings, 0.05 to 600. The client never waits longer than a third of the server's
@@ -105,6 +124,8 @@ export interface Statistics {
   bytesReceived: number;
   /** Bytes of pose messages, headers included. */
   poseBytesReceived: number;
+  /** Bytes of motion libraries that the client has fetched from the server. */
+  libraryBytesReceived: number;
   bytesSent: number;
   framesReceived: number;
   /** Pose messages received. */

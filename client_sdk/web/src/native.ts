@@ -18,6 +18,8 @@ interface Exports {
   start_connecting(client: number, nowS: number): void;
   on_connected(client: number, nowS: number): void;
   on_frame(client: number, bytes: number, nowS: number): void;
+  take_library_request(client: number): number;
+  on_library(client: number, hashBytes: number, bytes: number): number;
   on_lost(client: number, status: number, bytes: number, nowS: number): void;
   advance(client: number, nowS: number): void;
   take_output(client: number): number;

@@ -19,6 +19,7 @@ import {writeMessage} from './wire/write';
 import {WorldHandle} from './world';
 
 const inspectTimeoutS = 10;
+const cacheTimeoutMs = 2000;
 
 /** States and events of the module, in the order of their numbers. */
 const states: readonly ClientState[] =
@@ -72,8 +73,8 @@ export class Session {
   private readonly notifications: (() => void)[] = [];
   private notifying = false;
   private readonly total = {
-    bytesReceived: 0, poseBytesReceived: 0, framesReceived: 0, eventsReceived: 0, eventsDropped: 0,
-    invalidFrames: 0,
+    bytesReceived: 0, poseBytesReceived: 0, libraryBytesReceived: 0, framesReceived: 0,
+    eventsReceived: 0, eventsDropped: 0, invalidFrames: 0,
   };
   private decodeMs = 0;
   private interpolationDelayS = 0;
@@ -318,6 +319,7 @@ export class Session {
     const type = typeOfFrame(frame);
     const hasPoses = type === MessageType.PoseBatch || type === MessageType.Movements;
     if (hasPoses) this.total.poseBytesReceived += frame.byteLength;
+    if (type === MessageType.LibraryPiece) this.total.libraryBytesReceived += frame.byteLength;
     const startedMs = hasPoses ? this.precisionNowMs() : 0;
     this.run(() => {
       native().setInput(new Uint8Array(frame));
@@ -459,8 +461,46 @@ export class Session {
       throw native().explain(error);
     }
     this.takeEvents(frame);
+    this.takeLibraryRequests();
     this.synchronise();
     this.notify();
+  }
+
+  /** Loads libraries from the cache and stores new ones. Failures have no other effect than that
+   * the client fetches a library again. */
+  private takeLibraryRequests(): void {
+    const {libraryCache: cache} = this.options;
+    if (cache === null) return;
+    for (;;) {
+      const request = native().call.take_library_request(this.client);
+      if (request === 0) return;
+      const hash = native().text;
+      if (request === 1) {
+        // The promises below also handle exceptions of the cache.
+        const timer = setTimeout(() => this.onLibrary(hash, null), cacheTimeoutMs);
+        const finish = (file: Uint8Array | null): void => {
+          clearTimeout(timer);
+          this.onLibrary(hash, file);
+        };
+        Promise.resolve(hash).then((key) => cache.load(key)).then(finish, () => finish(null));
+      } else {
+        const [at, bytes] = native().results;
+        const file = native().bytes(at!, bytes!);
+        Promise.resolve(hash).then((key) => cache.store(key, file)).catch(() => {});
+      }
+    }
+  }
+
+  private onLibrary(hash: string, file: Uint8Array | null): void {
+    const key = new TextEncoder().encode(hash);
+    const bytes = file instanceof Uint8Array ? file : new Uint8Array(0);
+    const input = new Uint8Array(key.length + bytes.length);
+    input.set(key);
+    input.set(bytes, key.length);
+    this.run(() => {
+      native().setInput(input);
+      native().call.on_library(this.client, key.length, bytes.length);
+    });
   }
 
   private takeEvents(frame?: ArrayBuffer): void {

@@ -15,6 +15,7 @@ export const defaultOptions: Omit<SessionOptions, 'seed'> = {
   recordingS: 20,
   maxRecordingBytes: 192 * 2 ** 20,
   maxRecordedEvents: 65_536,
+  libraryCache: null,
   connectTimeoutS: 5,
   pingIntervalS: 1,
 };
@@ -37,7 +38,8 @@ export function createClient(options: SessionOptions): number {
   const numbers = Float64Array.of(
       options.maxCommands, options.poseHistory, options.maxPoseBytes, options.recordingS,
       options.maxRecordingBytes, options.connectTimeoutS, options.pingIntervalS,
-      Number(options.respawn), options.seed, options.renderDelayS);
+      Number(options.respawn), options.seed, options.renderDelayS,
+      Number(options.libraryCache !== null));
   const input = new Uint8Array(numbers.byteLength + name.length + token.length);
   input.set(new Uint8Array(numbers.buffer));
   input.set(name, numbers.byteLength);

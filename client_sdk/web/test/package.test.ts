@@ -54,7 +54,7 @@ world.observe({mode: 'everything'});
 new Client({url: 'ws://127.0.0.1:7421/stream', webSocket: Date});
 `;
 
-/** The programs of README.md, without fences: for Node.js with \`ws\`, and for browsers. */
+/** Programs of README.md: for Node.js with `ws`, for browsers, and with a cache of libraries. */
 const readme = readFileSync(`${workspace}/web/README.md`, 'utf8');
 const readmePrograms = [...readme.matchAll(/^```ts\n(.*?)^```$/gms)].map((match) => match[1]!);
 
@@ -106,9 +106,10 @@ before(() => {
   writeFileSync(join(project, 'package.json'),
                 JSON.stringify({name: 'user', private: true, type: 'module'}));
   writeFileSync(join(project, 'main.ts'), program);
-  assert.equal(readmePrograms.length, 2);
+  assert.equal(readmePrograms.length, 3);
   writeFileSync(join(project, 'readme_node.ts'), readmePrograms[0]!);
   writeFileSync(join(project, 'readme_browser.ts'), readmePrograms[1]!);
+  writeFileSync(join(project, 'readme_cache.ts'), readmePrograms[2]!);
 });
 
 after(() => rmSync(project, {recursive: true, force: true}));
@@ -117,7 +118,8 @@ for (const [module, moduleResolution] of [['esnext', 'bundler'], ['nodenext', 'n
   const resolution = {module, moduleResolution};
 
   test(`type-checks with ws in Node.js, module resolution ${moduleResolution}`, () => {
-    compile(['main.ts', 'readme_node.ts'], {...resolution, lib: ['es2022'], types: ['node']});
+    compile(['main.ts', 'readme_node.ts', 'readme_cache.ts'],
+            {...resolution, lib: ['es2022'], types: ['node']});
   });
 
   test(`type-checks with browser types, module resolution ${moduleResolution}`, () => {

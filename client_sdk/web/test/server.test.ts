@@ -37,7 +37,7 @@ for (const mode of ['full', 'quantised', 'movement'] as PoseMode[]) {
       const lines = (await run('web_pose_dump', [
         '127.0.0.1', `${server.port}`, 'plaza', '7', '120', mode === 'quantised' ? mode : 'full'
       ])).trim().split('\n').map((line) => line.split(' ').map(Number));
-      // Evaluated poses are not recorded, and equal the server's to the bit.
+      // Evaluated poses equal the server's to the bit. The recording stores them compressed.
       const source = mode === 'movement' ? world : world.recording;
       const newest = createPose();
       await until('the last pose has arrived', () =>

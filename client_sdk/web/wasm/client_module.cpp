@@ -47,6 +47,11 @@ struct Client {
   Vec3 root_position_m = Vec3(0.0f);
   std::vector<protocol::AvatarId> avatars;
   std::uint64_t held = 0;  ///< Poses that were sampled after the newest pose of their avatar.
+  bool has_library_cache = false;
+  std::vector<std::string> libraries_to_load;  ///< Hashes for take_library_request.
+  std::vector<std::string> loading_libraries;  ///< Hashes for on_library.
+  std::vector<LibraryTask> libraries_to_store;
+  LibraryTask stored_library;  ///< The file of the last take_library_request.
 };
 
 constexpr std::size_t kTextAt = 14;
@@ -86,26 +91,37 @@ std::optional<protocol::Message> DecodeInput(std::size_t bytes, protocol::Sender
   return *std::move(message);
 }
 
-/// Checks received libraries, which natively is the work of the network thread.
-void RunLibraryTasks(Session& session) {
-  while (const auto task = session.TakeLibraryTask()) {
-    if (task->file.empty()) {
-      session.OnLibraryTask(task->hash, Fail(ErrorCode::kNotFound, "there is no cache"));
-      continue;
+/// Opens the file of a library, which must have this hash.
+Expected<std::shared_ptr<const MotionLibrary>> OpenLibrary(std::span<const std::byte> file,
+                                                           const std::string& hash) {
+  auto library = MotionLibrary::FromBytes(file);
+  if (library && (*library)->hash() != hash) {
+    return Fail(ErrorCode::kMalformed, "the library has another hash than requested");
+  }
+  return library;
+}
+
+/// Checks received libraries, which natively is the work of the network thread, and collects
+/// requests to the cache.
+void RunLibraryTasks(Client& client) {
+  while (auto task = client.session.TakeLibraryTask()) {
+    if (!task->file.empty()) {
+      auto library = OpenLibrary(task->file, task->hash);
+      if (library && client.has_library_cache) client.libraries_to_store.push_back(*task);
+      client.session.OnLibraryTask(task->hash, std::move(library));
+    } else if (client.has_library_cache) {
+      client.libraries_to_load.push_back(task->hash);
+    } else {
+      client.session.OnLibraryTask(task->hash, Fail(ErrorCode::kNotFound, "there is no cache"));
     }
-    auto library = MotionLibrary::FromBytes(task->file);
-    if (library && (*library)->hash() != task->hash) {
-      library = Fail(ErrorCode::kMalformed, "the library has another hash than requested");
-    }
-    session.OnLibraryTask(task->hash, std::move(library));
   }
 }
 
 /// Stores the number of a command, and its text if it was refused.
-std::uint32_t Report(Session& session, stridewire_status status, std::uint64_t command) {
+std::uint32_t Report(Client& client, stridewire_status status, std::uint64_t command) {
   results[0] = static_cast<double>(command);
-  if (status != STRIDEWIRE_OK) SetText(session.last_text());
-  RunLibraryTasks(session);
+  if (status != STRIDEWIRE_OK) SetText(client.session.last_text());
+  RunLibraryTasks(client);
   return status;
 }
 
@@ -255,10 +271,10 @@ STRIDEWIRE_EXPORT(describe_status) void DescribeStatus(stridewire_status status,
 
 // ---- a client
 
-/// Creates a client. `input` contains 10 numbers, in the order in which they are read here, and
+/// Creates a client. `input` contains 11 numbers, in the order in which they are read here, and
 /// then the client's name and token. Returns null and sets the text if one of the texts is invalid.
 STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t token_bytes) {
-  std::array<double, 10> numbers;
+  std::array<double, 11> numbers;
   const auto input = Input(sizeof numbers + name_bytes + token_bytes);
   std::memcpy(numbers.data(), input.data(), sizeof numbers);
   const auto* texts = reinterpret_cast<const char*>(input.data() + sizeof numbers);
@@ -285,7 +301,9 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.seed = static_cast<std::uint64_t>(numbers[8]);
   options.render_delay_s = numbers[9];
   options.detailed_events = false;
-  return new Client(options);
+  auto client = std::make_unique<Client>(options);
+  client->has_library_cache = numbers[10] != 0.0;
+  return client.release();
 }
 
 STRIDEWIRE_EXPORT(destroy) void Destroy(Client* client) { delete client; }
@@ -317,8 +335,45 @@ STRIDEWIRE_EXPORT(on_connected) void OnConnected(Client* client, double now_s) {
 /// Handles the frame in `input`.
 STRIDEWIRE_EXPORT(on_frame) void OnFrame(Client* client, std::size_t bytes, double now_s) {
   client->session.OnFrame(Input(bytes), now_s);
-  RunLibraryTasks(client->session);
+  RunLibraryTasks(*client);
 }
+
+/// Returns 1 if the library whose hash is in the text should be loaded from the cache. Then call
+/// on_library. Returns 2 if a file should be stored in the cache under the hash in the text, and 0
+/// if there is nothing to do. results: 0 the address of the file, 1 its size. The file is valid
+/// until the next call.
+STRIDEWIRE_EXPORT(take_library_request) std::uint32_t TakeLibraryRequest(Client* client) {
+  client->stored_library = {};
+  if (!client->libraries_to_load.empty()) {
+    SetText(client->libraries_to_load.back());
+    client->loading_libraries.push_back(std::move(client->libraries_to_load.back()));
+    client->libraries_to_load.pop_back();
+    return 1;
+  }
+  if (client->libraries_to_store.empty()) return 0;
+  client->stored_library = std::move(client->libraries_to_store.back());
+  client->libraries_to_store.pop_back();
+  SetText(client->stored_library.hash);
+  results[0] = Address(client->stored_library.file);
+  results[1] = static_cast<double>(client->stored_library.file.size());
+  return 2;
+}
+/// Handles what the cache has loaded. `input` contains the hash and then the file, which has no
+/// bytes if the cache does not contain the library. Returns 1 if the file is the library of this
+/// hash. If not, the client fetches the library from the server.
+STRIDEWIRE_EXPORT(on_library)
+bool OnLibrary(Client* client, std::size_t hash_bytes, std::size_t bytes) {
+  const auto input = Input(hash_bytes + bytes);
+  const std::string hash(reinterpret_cast<const char*>(input.data()), hash_bytes);
+  if (std::erase(client->loading_libraries, hash) == 0) return false;
+  auto library = bytes == 0 ? Fail(ErrorCode::kNotFound, "the cache does not contain the library")
+                            : OpenLibrary(input.subspan(hash_bytes), hash);
+  const bool is_valid = library.has_value();
+  client->session.OnLibraryTask(hash, std::move(library));
+  RunLibraryTasks(*client);
+  return is_valid;
+}
+
 /// `input` contains a text of `bytes` bytes, which may be 0.
 STRIDEWIRE_EXPORT(on_lost)
 void OnLost(Client* client, stridewire_status status, std::size_t bytes, double now_s) {
@@ -369,7 +424,7 @@ std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes)
   if (!message) return STRIDEWIRE_INVALID_ARGUMENT;
   std::uint64_t command = 0;
   const stridewire_status status = std::visit(Submit{client->session, world, command}, *message);
-  return Report(client->session, status, command);
+  return Report(*client, status, command);
 }
 
 /// results: 0 mean and 1 worst jitter, 2 held poses, 3 ticks per second, and from 16 on the numbers

@@ -2,13 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <set>
 
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
+#include "runtime/library/pose_quantization.h"
 #include "test_library.h"
+#include "world_view.h"
 
 namespace stridewire::client {
 namespace {
@@ -190,6 +193,75 @@ TEST(ReplicaSet, RejectsAnInvalidRecord) {
   const Status status = replicas.Apply(message, sink);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
+}
+
+protocol::WorldInfo DescribeWorld(const MotionLibrary& library) {
+  protocol::WorldInfo info;
+  for (const Joint& joint : library.skeleton().joints) {
+    info.skeleton.joints.push_back(
+        {joint.name, static_cast<std::int16_t>(joint.parent), joint.offset_m});
+  }
+  return info;
+}
+
+// Returns the largest distance of a root between the view and its recording, over all times.
+double LargestRecordedErrorM(WorldView& view, double from_s, double to_s, std::size_t avatars) {
+  CrowdPose live;
+  CrowdPose recorded;
+  std::uint64_t held = 0;
+  double largest_m = 0.0;
+  for (double time_s = from_s; time_s <= to_s; time_s += 0.25) {
+    view.SampleAll(time_s, live, held);
+    view.recording().SampleAll(time_s, [](AvatarId) { return true; }, recorded);
+    EXPECT_EQ(live.avatars.size(), avatars);
+    EXPECT_EQ(recorded.avatars, live.avatars);
+    EXPECT_EQ(recorded.flags, live.flags);
+    for (std::size_t i = 0; i < recorded.avatars.size(); ++i) {
+      const Vec3 error_m = recorded.roots_m[i] - live.roots_m[i];
+      largest_m = std::fmax(largest_m, std::sqrt(glm::dot(error_m, error_m)));
+    }
+  }
+  return largest_m;
+}
+
+TEST(WorldView, RecordsEvaluatedPoses) {
+  constexpr std::size_t kAvatars = 20;  // More than a block of the encoder.
+  for (const bool is_compact : {true, false}) {
+    Server server(kAvatars);
+    protocol::WorldInfo info = DescribeWorld(*server.library());
+    if (is_compact) info.rotation_codes = ChoosePoseQuantization(*server.library()).joints;
+    PoseBudget budget{std::size_t{1} << 30, 0};
+    WorldView view(512, budget, PoseRecording(1e9, std::size_t{1} << 30));
+    view.SetInfo(info);
+    ReplicaSet replicas(server.library(), kTickS, 100);
+    WorldView::Counts counts;
+    for (int i = 0; i < 100; ++i) {
+      ASSERT_TRUE(view.Apply(server.Step(), replicas, 1, counts));
+    }
+    EXPECT_EQ(view.recording().first_time_s(), 1.0);
+    EXPECT_EQ(view.recording().last_time_s(), 100.0);
+    const double error_m = LargestRecordedErrorM(view, 1.0, 100.0, kAvatars);
+    EXPECT_GT(error_m, 0.0);
+    EXPECT_LT(error_m, 1e-4);
+  }
+}
+
+TEST(WorldView, RecordsEvaluatedPosesOfDueTicksAndWithinItsLimit) {
+  Server server(5);
+  PoseBudget budget{std::size_t{1} << 30, 0};
+  WorldView view(512, budget, PoseRecording(10.0, std::size_t{1} << 30));
+  view.SetInfo(DescribeWorld(*server.library()));
+  ReplicaSet replicas(server.library(), kTickS, 100);
+  WorldView::Counts counts;
+  for (int i = 0; i < 101; ++i) ASSERT_TRUE(view.Apply(server.Step(), replicas, 4, counts));
+  // A tick takes 1 s in these messages, and every fourth one is recorded.
+  EXPECT_EQ(view.recording().last_time_s(), 100.0);
+  EXPECT_EQ(view.recording().first_time_s(), 92.0);
+
+  WorldView other(512, budget);
+  other.SetInfo(DescribeWorld(*server.library()));
+  ASSERT_TRUE(other.Apply(server.States(), replicas, 1, counts));
+  EXPECT_EQ(other.recording().bytes(), 0u);
 }
 
 }  // namespace
