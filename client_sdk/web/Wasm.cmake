@@ -14,7 +14,8 @@ endforeach()
 find_path(wasm_eigen_dir Eigen PATH_SUFFIXES eigen3 REQUIRED NO_CACHE)
 file(CREATE_LINK ${wasm_eigen_dir}/Eigen ${wasm_dir}/include/Eigen SYMBOLIC)
 
-set(wasm_flags --target=wasm32-wasi -std=c++23 -O2 -DNDEBUG -DXXH_INLINE_ALL -msimd128
+set(wasm_flags --target=wasm32-wasi -std=c++23 -O3 -DNDEBUG -DXXH_INLINE_ALL -msimd128
+    -mbulk-memory -mnontrapping-fptoint
     -fno-exceptions -fno-rtti -fmacro-prefix-map=${PROJECT_SOURCE_DIR}/= -ffp-contract=off
     -fvisibility=hidden -Wall -Wextra -Wshadow
     -Wno-missing-field-initializers -Wno-missing-designated-field-initializers
