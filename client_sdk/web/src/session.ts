@@ -212,11 +212,15 @@ export class Session {
       active.answer?.(makeReply(Status.cancelled, ''));
       return Promise.resolve(makeReply(0, ''));
     }
-    return this.command(world, () => {
-      if (active === undefined) throw new StridewireError(Status.no_such_subscription, '');
-      world.subscriptions.delete(id);
-      return {type: 'StopObserving', seq: 1n, subscription: active.handle};
-    });
+    return new Promise((resolve) => this.run(() => {
+      try {
+        if (active === undefined) throw new StridewireError(Status.no_such_subscription, '');
+        this.submit(world, {type: 'StopObserving', seq: 1n, subscription: active.handle}, resolve);
+        world.subscriptions.delete(id);
+      } catch (error) {
+        resolve(refusal(error));
+      }
+    }));
   }
 
   leave(world: WorldHandle): Promise<Reply> {
@@ -227,8 +231,7 @@ export class Session {
       });
       return Promise.resolve(makeReply(0, ''));
     }
-    const reply = this.command(world, () => ({type: 'LeaveWorld', seq: 1n, world: 1}));
-    return reply;
+    return this.command(world, () => ({type: 'LeaveWorld', seq: 1n, world: 1}));
   }
 
   inspect(world: WorldHandle, avatar: number): Promise<AvatarState> {
@@ -677,6 +680,7 @@ export class Session {
         world.handle = 0;
         this.worlds.delete(world);
         world.reset();
+        this.setWorldState(world, 'left');
         continue;
       }
       this.setWorldState(world, worldStates[number]!);

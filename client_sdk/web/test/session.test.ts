@@ -326,6 +326,38 @@ test('leaves a world and can join it again', async () => {
   assert.equal(h.session.joinWorld('plaza', 'observer').state, 'joining');
 });
 
+test('leaves a world before the client is connected', async () => {
+  const h = new Harness();
+  h.session.open(h.nowS);
+  const world = h.session.joinWorld('plaza', 'controller');
+  const states: string[] = [];
+  world.on('state', (state) => states.push(state));
+  assert.equal(statusOf(await settled(world.leave())), 'ok');
+  assert.equal(statusOf(await settled(world.joined)), 'not_joined');
+  assert.equal(world.state, 'left');
+  assert.deepEqual(states, ['left']);
+  assert.equal(h.session.joinWorld('plaza', 'observer').state, 'pending');
+});
+
+test('a subscription can be stopped again if the command was refused', async () => {
+  const h = new Harness({maxCommands: 2});
+  const world = h.joined();
+  const subscription = world.observe({mode: 'full'});
+  const [observe] = h.sent();
+  assert.ok(observe?.type === 'Observe');
+  h.receive(server.reply(observe.seq));
+  void world.remove([1]);
+  void world.remove([2]);
+  assert.equal(statusOf(await settled(subscription.stop())), 'commands_full');
+  for (const message of h.sent()) {
+    if ('seq' in message) h.receive(server.reply(message.seq));
+  }
+  const stopped = subscription.stop();
+  assert.deepEqual(summary(h.sent()), ['StopObserving 6']);
+  h.receive(server.reply(6n));
+  assert.equal(statusOf(await settled(stopped)), 'ok');
+});
+
 test('close cancels commands, sends Goodbye and allows a new connection', async () => {
   const h = new Harness();
   const world = h.joined();
