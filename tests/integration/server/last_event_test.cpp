@@ -280,11 +280,12 @@ TEST(LastEvent, FollowsEveryAcceptedRequestExactlyOnce) {
   }
 }
 
-// One command can drop very many requests. Their events are spread over ticks.
+// One command can drop very many requests. A shard spreads their events over ticks if there are
+// more than kMaxDroppedPerTick (16,384).
 TEST(LastEvent, FollowsEveryRequestOfALargeCancellation) {
   constexpr AvatarId kCrowd = 100;
   constexpr int kRequests = 200;
-  TestServer server;
+  TestServer server(TestConfig(1));
   Witness witness(server, "stage");
   RawClient& client = witness.client();
   protocol::Spawn spawn{.seq = client.NextSeq(), .world = witness.world(), .items = {}};

@@ -10,7 +10,7 @@ std::string ClientOf(const TrustedProxies& proxies, const std::string& peer,
   return proxies.ClientOf(boost::asio::ip::make_address(peer), forwarded).to_string();
 }
 
-TEST(TrustedProxies, TrustNobodyByDefault) {
+TEST(TrustedProxies, AreEmptyByDefault) {
   EXPECT_EQ(ClientOf({}, "127.0.0.1", "203.0.113.7"), "127.0.0.1");
 }
 
@@ -39,7 +39,7 @@ TEST(TrustedProxies, ReturnTheLastAddressThatIsNotTrusted) {
            Case{"127.0.0.1", "203.0.113.7, unknown", "127.0.0.1"},
            Case{"127.0.0.1", "203.0.113.7,", "127.0.0.1"},
            Case{"127.0.0.1", "[", "127.0.0.1"},
-           // The peer is no proxy, so its header means nothing.
+           // The peer is not a trusted proxy, so its header is ignored.
            Case{"11.0.0.1", "203.0.113.7", "11.0.0.1"},
            Case{"127.0.0.2", "203.0.113.7", "127.0.0.2"},
        }) {
@@ -48,7 +48,7 @@ TEST(TrustedProxies, ReturnTheLastAddressThatIsNotTrusted) {
   }
 }
 
-TEST(TrustedProxies, RejectWhatIsNoNetwork) {
+TEST(TrustedProxies, RejectInvalidNetworks) {
   for (const char* text : {"", "localhost", "10.0.0.0/33", "10.0.0.0/", "10.0.0.0/-1", "::1/129",
                            "10.0.0.0/8/8", "10.0.0.1:80"}) {
     const std::vector<std::string> networks{"::1", text};
