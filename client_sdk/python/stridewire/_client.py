@@ -37,6 +37,14 @@ def _check(status: int) -> None:
         raise StridewireError(_name(status), _library.stridewire_status_text(status).decode())
 
 
+def _point(position_m: Vec3) -> tuple[float, ...]:
+    # ctypes would fill a shorter sequence with zeros.
+    point = tuple(position_m)
+    if len(point) != 3:
+        raise ValueError(f"expected a position of 3 numbers (x, y, z), got {len(point)}")
+    return point
+
+
 def _ids(avatars: Iterable[int]) -> Any:
     ids = list(avatars)
     return (c.c_uint32 * len(ids))(*ids)
@@ -65,14 +73,15 @@ class Client:
     `timeout_s` limits every call that waits for the server. A client is not thread-safe.
     """
 
-    #: Number of events that `poll_events` keeps. Older ones are dropped.
+    #: Number of events that are kept for `poll_events`, and in each world for `wait`. If there are
+    #: more, the oldest are dropped.
     MAX_EVENTS = 65536
 
     def __init__(self, address: str, *, name: str = "stridewire-python", token: str = "",
                  timeout_s: float = 10.0, render_delay_s: float = 0.1, pose_history: int = 256,
                  respawn: bool = False, library_folder: str | None = None) -> None:
         host, colon, port = address.rpartition(":")
-        if not colon or not port.isdigit():
+        if not colon or not port.isdecimal() or int(port) > 65535:
             raise ValueError(f"address: expected HOST:PORT, got {address!r}")
         self.timeout_s = timeout_s
         self._handle = c.c_void_p()
@@ -139,7 +148,7 @@ class Client:
         return text.value.decode("utf-8", "replace")
 
     def _pump(self, patience_s: float) -> None:
-        """Waits for events, at most `patience_s`, and hands them to the watchers."""
+        """Waits for events, at most `patience_s`, and passes them to the watchers."""
         if not self._handle:
             raise StridewireError("closed", "the client is closed")
         status = _library.stridewire_client_wait_event(self._handle, patience_s)
@@ -214,10 +223,12 @@ class World:
         client._watchers.append(self._watch)
 
     def _watch(self, event: Event) -> None:
-        # Remembers how the requests of this world object ended, for wait().
+        # Stores the last events of the requests of this object, for wait().
         if event.world == self._handle and event.request_id in self._open and event.outcome:
             self._open.discard(event.request_id)
             self._ended[event.request_id] = event
+            if len(self._ended) > self.client.MAX_EVENTS:
+                del self._ended[next(iter(self._ended))]
 
     def _command(self, function: Callable[..., int], *arguments: Any) -> list[Event]:
         command = c.c_uint64()
@@ -234,13 +245,13 @@ class World:
     def spawn(self, position_m: Vec3 = (0.0, 0.0, 0.0), heading_rad: float = 0.0,
               avatar: int = 0) -> int:
         """Spawns an avatar and returns its id. With `avatar` 0 the server chooses the id."""
-        spawn = _abi.stridewire_spawn(avatar, tuple(position_m), heading_rad)
+        spawn = _abi.stridewire_spawn(avatar, _point(position_m), heading_rad)
         items = self._command(_library.stridewire_client_spawn, c.byref(spawn), 1)
         return items[0].avatar if items else avatar
 
     def teleport(self, avatar: int, position_m: Vec3, heading_rad: float = 0.0) -> None:
         """Moves an avatar at once. It drops its requests and stands."""
-        place = _abi.stridewire_spawn(avatar, tuple(position_m), heading_rad)
+        place = _abi.stridewire_spawn(avatar, _point(position_m), heading_rad)
         self._command(_library.stridewire_client_teleport, c.byref(place), 1)
 
     def remove(self, *avatars: int) -> None:
@@ -270,7 +281,7 @@ class World:
         if side_m is not None:
             m.has_side, m.side_m = 1, side_m
         if at_m is not None:
-            m.has_at, m.at_m = 1, tuple(at_m)
+            m.has_at, m.at_m = 1, _point(at_m)
             if heading_rad is not None:
                 m.has_heading, m.heading_rad = 1, heading_rad
         return self._request(m)
@@ -279,9 +290,9 @@ class World:
                 waypoints_m: Sequence[Vec3] = (), speed_m_s: float | None = None,
                 interrupt: Interrupt = Interrupt.QUEUED) -> int:
         """Requests a walk to a place and heading."""
-        m = _abi.stridewire_movement(avatar=avatar, type=_WALK, at_m=tuple(at_m),
+        m = _abi.stridewire_movement(avatar=avatar, type=_WALK, at_m=_point(at_m),
                                      heading_rad=heading_rad, interrupt=interrupt)
-        numbers = [number for point in waypoints_m for number in point]
+        numbers = [number for point in waypoints_m for number in _point(point)]
         m.waypoints_m = (c.c_double * len(numbers))(*numbers)
         m.waypoint_count = len(waypoints_m)
         if speed_m_s is not None:
@@ -320,7 +331,8 @@ class World:
     def wait(self, request_id: int, timeout_s: float = 60.0) -> Event:
         """Waits until a request has ended, and returns its last event. See its `outcome`."""
         if request_id not in self._open and request_id not in self._ended:
-            raise ValueError(f"no request has the id {request_id}, or its end was already returned")
+            raise ValueError(f"no request has the id {request_id}, or its last event was already "
+                             "returned or dropped")
         deadline = time.monotonic() + timeout_s
         while request_id not in self._ended:
             left_s = deadline - time.monotonic()

@@ -190,6 +190,32 @@ class Live(unittest.TestCase):
                 observer.spawn()
             self.assertEqual(caught.exception.status, "not_allowed")
 
+    def test_wrong_positions(self):
+        with stridewire.Client(self.address) as client:
+            world = client.join("positions")
+            avatar = world.spawn()
+            for call in (lambda: world.spawn((1.0, 2.0)),
+                         lambda: world.teleport(avatar, (1.0, 2.0, 3.0, 4.0)),
+                         lambda: world.step(avatar, at_m=(0.1, 0.4)),
+                         lambda: world.walk_to(avatar, (0.0, 2.0)),
+                         lambda: world.walk_to(avatar, (0.0, 0.0, 2.0),
+                                               waypoints_m=[(0.0, 1.0)])):
+                with self.assertRaisesRegex(ValueError, "3 numbers"):
+                    call()
+
+    def test_keeps_the_last_ends_of_requests(self):
+        class SmallClient(stridewire.Client):
+            MAX_EVENTS = 2
+
+        with SmallClient(self.address) as client:
+            world = client.join("ends")
+            avatar = world.spawn()
+            stands = [world.stand(avatar, 0.05) for _ in range(3)]
+            self.assertEqual(world.wait(stands[2]).outcome, Outcome.COMPLETED)
+            with self.assertRaises(ValueError):
+                world.wait(stands[0])
+            self.assertEqual(world.wait(stands[1]).outcome, Outcome.COMPLETED)
+
     def test_layers_and_movement_mode(self):
         with stridewire.Client(self.address) as client:
             world = client.join("layers")
@@ -205,8 +231,9 @@ class Live(unittest.TestCase):
             world.leave()
 
     def test_connection_errors(self):
-        with self.assertRaises(ValueError):
-            stridewire.Client("localhost")
+        for address in ("localhost", "127.0.0.1:72956", "127.0.0.1:-1"):
+            with self.assertRaises(ValueError):
+                stridewire.Client(address)
         with self.assertRaises(StridewireError) as caught:
             stridewire.Client("127.0.0.1:1", timeout_s=0.5)
         self.assertEqual(caught.exception.status, "timeout")
