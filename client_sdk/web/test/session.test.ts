@@ -290,6 +290,19 @@ test('limits unanswered commands and waiting commands', async () => {
   assert.equal(h.sent().length, 2);
 });
 
+test('answers every command, even if very many end at once', async () => {
+  const h = new Harness({maxCommands: 70_000});
+  h.session.open(h.nowS);
+  const world = h.session.joinWorld('plaza', 'controller');
+  const counts = new Map<string, number>();
+  for (let i = 0; i < 69_999; ++i) {
+    void world.remove([1]).then(({status}) => counts.set(status, (counts.get(status) ?? 0) + 1));
+  }
+  h.session.close(h.nowS);
+  await settled(world.joined);
+  assert.deepEqual([...counts], [['cancelled', 69_999]]);
+});
+
 test('rejects a message above the size limit of the server without a gap in seq', async () => {
   const h = new Harness();
   const world = h.joined({maxBulkBytes: 4096});

@@ -289,6 +289,8 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.client_name = hello.client_name;
   options.auth_token = hello.auth_token;
   options.max_commands = static_cast<std::size_t>(numbers[0]);
+  // The end of a session adds a reply for each command in one call, and none of them may be lost.
+  options.max_events += options.max_commands;
   options.pose_history = static_cast<std::size_t>(numbers[1]);
   // An address has 32 bits here.
   constexpr double kMaxBytes = 4294967295.0;
