@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include "captured_library.h"
 #include "offline/build/layers.h"
 #include "offline/builtin/builtin_library.h"
+#include "offline/complete/complete_library.h"
 #include "rough_ground.h"
 #include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/choreography.h"
@@ -148,10 +150,12 @@ struct Subject {
 
 class ReframedCaptures : public testing::TestWithParam<Subject> {};
 
+// Builds a library as `stridewire-library build` does.
 Library Build(const std::vector<Capture>& captures, bool mirrors) {
   LibraryAssembler assembler({.mirror = mirrors});
   for (const Capture& capture : captures) assembler.Add(capture);
   RawLibrary raw = assembler.Assemble().value();
+  CompleteLibrary(raw);
   raw.layers.push_back(CutLayer(captures[0], raw.skeleton, {.name = "layer"}).value());
   return LibraryBuilder::Selecting().Build(raw).value();
 }
@@ -308,19 +312,28 @@ TEST(ReframedCases, PlayTheSameWithKneesForward) {
 std::vector<Subject> Subjects() {
   std::vector<Subject> subjects;
   for (const bool mirrors : {false, true}) {
-    for (const char* name : {"01", "03", "05", "06", "09", "14", "16", "29", "32", kDebianTakes}) {
+    for (const char* name : {"01", "03", "05", "06", "09", "14", "16", "29", "32", kDebianTakes,
+                             "gaits/07", "gaits/08", "gaits/127", "gaits/135", "gaits/16",
+                             "gaits/17", "other/animated-drawings", "other/daz", "other/pymo"}) {
       subjects.push_back({name, mirrors});
     }
   }
   return subjects;
 }
 
-INSTANTIATE_TEST_SUITE_P(Subjects, ReframedCaptures, testing::ValuesIn(Subjects()),
-                         [](const auto& of) {
-                           const std::string name = of.param.name;
-                           return (name == kDebianTakes ? "Debian" : "Subject" + name) +
-                                  (of.param.mirrors ? "Mirrored" : "");
-                         });
+// Returns a name such as "Subject01Mirrored" or "gaits07".
+std::string TestName(const testing::TestParamInfo<Subject>& of) {
+  std::string name = of.param.name;
+  if (name == kDebianTakes) {
+    name = "Debian";
+  } else if (!name.contains('/')) {
+    name = "Subject" + name;
+  }
+  std::erase_if(name, [](char c) { return std::isalnum(c) == 0; });
+  return name + (of.param.mirrors ? "Mirrored" : "");
+}
+
+INSTANTIATE_TEST_SUITE_P(Subjects, ReframedCaptures, testing::ValuesIn(Subjects()), TestName);
 
 }  // namespace
 }  // namespace stridewire

@@ -16,8 +16,10 @@ namespace stridewire {
 /// Stands for the two takes of subject 01 in Debian's package assimp-testmodels.
 inline constexpr const char* kDebianTakes = "assimp-testmodels";
 
-/// Returns the takes of one subject of the CMU captures ("03", "16"), or those of kDebianTakes.
+/// Returns the takes of one subject of the CMU captures ("03", "16"), of a folder below MocapDir()
+/// ("gaits/07"), or those of kDebianTakes.
 inline std::vector<std::filesystem::path> TakesOfOne(const std::string& subject) {
+  if (subject.contains('/')) return MocapFiles(subject);
   if (subject != kDebianTakes) return MocapFiles("cmu/" + subject);
   std::vector<std::filesystem::path> takes;
   for (const char* name : {"01_01.bvh", "01_03.bvh"}) {

@@ -20,8 +20,11 @@ namespace {
 constexpr double kStartWeight = 4.0;
 // A parameter that the request does not give has a small weight, so that it follows the others.
 constexpr double kFreeWeight = 0.02;
-// Of two groups that fit equally well, the one with fewer parameters is preferred.
+// Of two groups that fit equally well, the one with fewer parameters is preferred, then the first.
 constexpr double kCostPerParameterM = 1e-3;
+// Groups whose costs differ by less fit equally well. Requests often lie on the edge of a group, and
+// rounding errors must not choose between it and another group.
+constexpr double kTieM = 1e-5;
 // A standing avatar starts with the unexpected foot only if that reduces the cost by this much.
 constexpr double kFootPreferenceM = 0.01;
 
@@ -214,7 +217,7 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
     if (is_straight && IsGeneral(group)) group_cost_m += kStraightPreferenceM;
     if (group.is_completed) group_cost_m += kCompletedCostM;
     const auto plan = PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m,
-                                  best_cost_m, is_completed_library);
+                                  best_cost_m - kTieM, is_completed_library);
     if (!plan) continue;
     STRIDEWIRE_CHECK(plan->cost_m + group_cost_m < best_cost_m);
     best_cost_m = plan->cost_m + group_cost_m;
