@@ -26,7 +26,7 @@ constexpr double kMaxKneeDegPerS = 800.0;
 constexpr double kMaxAcceleration = 17.0;       // Of the pelvis, vertical, in m/s².
 constexpr double kMaxUsualAcceleration = 10.0;  // The same in 99 % of all frames.
 constexpr std::size_t kAveragedFrames = 5;
-// People take one tread at a time, however low it is.
+// People take one tread at a time if two are higher than this.
 constexpr double kMaxClimbM = 0.18;
 
 struct Flight {
@@ -155,7 +155,8 @@ TEST_P(StairsWalk, StaysWithinHumanLimits) {
   constexpr unsigned kSeed = 5;
   std::printf("seed %u\n", kSeed);
   Random random(kSeed);
-  std::vector<Flight> flights{{0.1, 0.3, 7}, {0.17, 0.3, 7}};
+  // The last of these treads are as short as the feet of `builtin`, so that heels overhang them.
+  std::vector<Flight> flights{{0.1, 0.3, 7}, {0.17, 0.3, 7}, {0.2, 0.26, 6}};
   for (int i = 0; i < 3; ++i) {
     flights.push_back({random.Draw(0.1, 0.17), random.Draw(0.29, 0.38), 6});
   }
@@ -177,7 +178,7 @@ TEST_P(StairsWalk, StaysWithinHumanLimits) {
     EXPECT_LE(motion.knee_deg_per_s, kMaxKneeDegPerS);
     EXPECT_LE(motion.acceleration, kMaxAcceleration);
     EXPECT_LE(motion.usual_acceleration, kMaxUsualAcceleration);
-    EXPECT_LE(motion.climb_m, kMaxClimbM);
+    EXPECT_LE(motion.climb_m, std::max(kMaxClimbM, flight.rise_m + 1e-6));
   }
 }
 

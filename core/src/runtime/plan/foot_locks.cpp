@@ -40,9 +40,13 @@ double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
   return side.ball_height_m * (1.0 / normal.y - 1.0);
 }
 
+Sole SoleOf(const LegRig::Side& side) {
+  return {side.foot_m + kSoleBehindAnkleM, side.toe_m, kHalfFootWidthM};
+}
+
 FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side, const Footprint& print) {
   return SupportOf(terrain, print.position_m.x, print.position_m.z, print.heading_rad,
-                   {side.foot_m + kSoleBehindAnkleM, side.toe_m, kHalfFootWidthM});
+                   SoleOf(side));
 }
 
 void LandOnGround(const Terrain& terrain, const LegRig::Side& side, FootTrajectory& trajectory) {

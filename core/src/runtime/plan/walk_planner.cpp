@@ -53,6 +53,13 @@ constexpr double kUnhurriedClimbM = 0.08;
 constexpr double kLeastCarried = 0.999;
 constexpr double kDeepestGapM = 0.04;
 constexpr double kHighestRiseM = 0.04;
+// On treads that are too short for a foot, these parts of the sole behind and in front of the ball
+// must rest on the tread. The rest may overhang its edges.
+constexpr double kBearingHeel = 0.6;
+constexpr double kBearingToes = 0.3;
+// The edges of a tread are where the ground rises or drops by more than kEdgeM within kEdgeStepM.
+constexpr double kEdgeM = 0.04;
+constexpr double kEdgeStepM = 0.02;
 // An obstacle along a swing may be at most this much higher than both ends of the swing.
 constexpr double kMaxHurdleM = 0.25;
 constexpr double kHurdleRadiusM = 0.06;
@@ -224,10 +231,52 @@ class StepPlanner {
            v.z <= profile_.longest_m && v.z >= -std::max(profile_.back_m, 0.15);
   }
 
-  bool Carries(Foot foot, const Footprint& print) const {
-    const FootSupport support = SupportOf(*terrain_, library_.leg_rig().side(foot), print);
+  static bool Carries(const FootSupport& support) {
     return support.normal.y >= kLeastWalkNormalY && support.carried >= kLeastCarried &&
            support.gap_m <= kDeepestGapM && support.rise_m <= kHighestRiseM;
+  }
+  bool Carries(Foot foot, const Footprint& print) const {
+    return Carries(SupportOf(*terrain_, library_.leg_rig().side(foot), print));
+  }
+
+  // Returns the carried fraction of a sole that may overhang the tread below it, or 0 if the tread
+  // does not carry enough of it.
+  [[nodiscard]] double CarriedByTread(const Footprint& print) const {
+    const LegRig::Side& side = library_.leg_rig().side(moving_);
+    const FootSupport whole = SupportOf(*terrain_, side, print);
+    if (whole.rise_m > kHighestRiseM) return 0.0;
+    Sole bearing = SoleOf(side);
+    bearing.heel_m *= kBearingHeel;
+    bearing.toe_m *= kBearingToes;
+    const FootSupport support =
+        SupportOf(*terrain_, print.position_m.x, print.position_m.z, print.heading_rad, bearing);
+    return Carries(support) ? whole.carried : 0.0;
+  }
+
+  // Returns true if a footprint is on a tread that is too short for the foot and the room that it
+  // needs in front of its toes and behind its heel.
+  [[nodiscard]] bool IsOnShortTread(const Footprint& print) const {
+    const Sole sole = SoleOf(library_.leg_rig().side(moving_));
+    const double length_m = sole.heel_m + sole.toe_m + 2.0 * kRoomM;
+    double tread_m = 0.0;
+    for (const double step_m : {kEdgeStepM, -kEdgeStepM}) {
+      const DVec3 step = RotateYaw(print.heading_rad, DVec3(0.0, 0.0, step_m));
+      DVec3 at = print.position_m;
+      double height_m = terrain_->HeightAt(at.x, at.z);
+      for (bool is_edge = false; !is_edge; tread_m += kEdgeStepM) {
+        if (tread_m > length_m) return false;
+        at += step;
+        const double next_m = terrain_->HeightAt(at.x, at.z);
+        is_edge = std::fabs(next_m - height_m) > kEdgeM;
+        height_m = next_m;
+      }
+    }
+    return tread_m <= length_m + kEdgeStepM;
+  }
+
+  // Returns true if the ground carries the sole or, on a short tread, enough of it.
+  [[nodiscard]] bool CarriesOrOverhangs(const Footprint& print) const {
+    return Carries(moving_, print) || (CarriedByTread(print) > 0.0 && IsOnShortTread(print));
   }
 
   // Returns true if the ground does not rise abruptly right in front of the toes or behind the
@@ -248,15 +297,27 @@ class StepPlanner {
   }
 
   // Returns the footprint, moved forward or backward if its toes or heel would touch a riser and
-  // the tread leaves them room.
+  // the tread leaves them room. On a tread that is too short for the foot, moves the footprint to
+  // where the tread carries most of it.
   Footprint WithRoom(const Footprint& print) const {
-    if (HasRoom(print)) return print;
+    const bool is_on_short_tread = IsOnShortTread(print);
+    if (!is_on_short_tread && HasRoom(print)) return print;
+    Footprint best = print;
+    double most_carried = is_on_short_tread && HasRoom(print) ? CarriedByTread(print) : 0.0;
     for (const double shift_m : kRoomShiftsM) {
       Footprint moved = print;
       moved.position_m += RotateYaw(print.heading_rad, DVec3(0.0, 0.0, shift_m));
-      if (HasRoom(moved) && Carries(moving_, moved)) return moved;
+      if (!HasRoom(moved)) continue;
+      if (!is_on_short_tread) {
+        if (Carries(moving_, moved)) return moved;
+        continue;
+      }
+      const double carried = CarriedByTread(moved);
+      if (carried <= most_carried) continue;
+      most_carried = carried;
+      best = moved;
     }
-    return print;
+    return best;
   }
 
   [[nodiscard]] bool IsSloped(const Footprint& print) const {
@@ -279,7 +340,7 @@ class StepPlanner {
       shorter.position_m -= RotateYaw(print.heading_rad, DVec3(0.0, 0.0, (1.0 - part) * ahead_m));
       shorter = WithRoom(shorter);
       const double part_m = climb_m(shorter) * (full_m > 0.0 ? 1.0 : -1.0);
-      if (part_m >= kLeastClimbM && part_m <= easy_m && Carries(moving_, shorter)) {
+      if (part_m >= kLeastClimbM && part_m <= easy_m && CarriesOrOverhangs(shorter)) {
         return shorter;
       }
     }
@@ -294,7 +355,7 @@ class StepPlanner {
       has_seen_heights_ = true;
       return false;
     }
-    if (!Carries(moving_, print)) {
+    if (!CarriesOrOverhangs(print)) {
       has_seen_bad_ground_ = true;
       return false;
     }
