@@ -22,8 +22,8 @@ constexpr double kStartWeight = 4.0;
 constexpr double kFreeWeight = 0.02;
 // Of two groups that fit equally well, the one with fewer parameters is preferred, then the first.
 constexpr double kCostPerParameterM = 1e-3;
-// Groups whose costs differ by less fit equally well. Requests often lie on the edge of a group, and
-// rounding errors must not choose between it and another group.
+// Groups whose costs differ by less than this fit equally well. Requests often lie on the edge of a
+// group, and rounding errors must not choose between it and another group.
 constexpr double kTieM = 1e-5;
 // A standing avatar starts with the unexpected foot only if that reduces the cost by this much.
 constexpr double kFootPreferenceM = 0.01;
