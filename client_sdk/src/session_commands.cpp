@@ -162,8 +162,10 @@ void SessionCommands::FailUnsent(World& world, stridewire_status status, std::st
 
 void SessionCommands::FailAll(stridewire_status status, std::string_view text) {
   for (const auto& [seq, command] : std::exchange(unanswered_, {})) {
-    if (std::holds_alternative<protocol::JoinWorld>(command.message))
+    if (std::holds_alternative<protocol::JoinWorld>(command.message) &&
+        worlds_.contains(command.world)) {
       continue;  // These commands are answered below, together with their worlds.
+    }
     Answer(command, status, text);
   }
   for (auto& [handle, world] : worlds_) {

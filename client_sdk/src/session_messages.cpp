@@ -87,7 +87,9 @@ void Session::RestoreSession() {
   // An unanswered Observe is sent again under its command number, because its REPLY is still due.
   std::map<protocol::SubscriptionId, Command> unanswered_observes;
   for (auto& [seq, command] : std::exchange(unanswered_, {})) {
-    if (std::holds_alternative<protocol::JoinWorld>(command.message)) continue;
+    const auto world = worlds_.find(command.world);
+    const bool is_known = world != worlds_.end();
+    if (is_known && std::holds_alternative<protocol::JoinWorld>(command.message)) continue;
     if (std::holds_alternative<protocol::LeaveWorld>(command.message) ||
         std::holds_alternative<protocol::StopObserving>(command.message)) {
       Answer(command, STRIDEWIRE_OK);  // In a new session there is nothing to leave or stop.
@@ -98,7 +100,7 @@ void Session::RestoreSession() {
         Answer(command, STRIDEWIRE_OK);  // The subscription is restored below.
         continue;
       }
-      if (worlds_.at(command.world).subscriptions.contains(observe->subscription)) {
+      if (is_known && world->second.subscriptions.contains(observe->subscription)) {
         unanswered_observes.emplace(observe->subscription, std::move(command));
         continue;
       }
@@ -179,7 +181,9 @@ void Session::Handle(const protocol::WorldInfo& message, double now_s) {
       return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
                             "the server sent WorldInfo for a command other than JoinWorld", now_s);
     }
-    world = &worlds_.at(command->second.world);
+    const auto joined = worlds_.find(command->second.world);
+    if (joined == worlds_.end()) return;
+    world = &joined->second;
   } else {
     for (auto& [handle, candidate] : worlds_) {
       if (candidate.name == message.name && candidate.state != World::State::kRefused) {
@@ -202,10 +206,12 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
   if (found == unanswered_.end()) return;
   const Command command = std::move(found->second);
   unanswered_.erase(found);
-  World& world = worlds_.at(command.world);
+  // Replies may arrive in any order: the world is unknown if a later LeaveWorld was answered first.
+  const auto entry = worlds_.find(command.world);
+  World* world = entry == worlds_.end() ? nullptr : &entry->second;
 
-  if (std::holds_alternative<protocol::JoinWorld>(command.message)) {
-    return OnJoinReply(world, message, now_s);
+  if (world != nullptr && std::holds_alternative<protocol::JoinWorld>(command.message)) {
+    return OnJoinReply(*world, message, now_s);
   }
   stridewire_status status = ToStatus(message.code);
   const auto* spawn = std::get_if<protocol::Spawn>(&command.message);
@@ -222,15 +228,17 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
     event.request_id = item.request_id;
     events_.Push(event);
   }
-  if (spawn != nullptr) {
-    OnSpawnReply(world, *spawn, message);
-  } else if (const auto* remove = std::get_if<protocol::Remove>(&command.message)) {
-    OnRemoveReply(world, *remove, message);
-  } else if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
-    OnObserveReply(world, *observe, message);
-  } else if (std::holds_alternative<protocol::StopObserving>(command.message)) {
+  if (std::holds_alternative<protocol::StopObserving>(command.message)) {
     // The subscription has already ended, which is the requested state.
     if (status == STRIDEWIRE_NO_SUCH_SUBSCRIPTION) status = STRIDEWIRE_OK;
+  } else if (world != nullptr && spawn != nullptr) {
+    OnSpawnReply(*world, *spawn, message);
+  } else if (const auto* remove = std::get_if<protocol::Remove>(&command.message);
+             world != nullptr && remove != nullptr) {
+    OnRemoveReply(*world, *remove, message);
+  } else if (const auto* observe = std::get_if<protocol::Observe>(&command.message);
+             world != nullptr && observe != nullptr) {
+    OnObserveReply(*world, *observe, message);
   }
   // If only some items failed, the reply as a whole is OK. Report the first failed item instead.
   std::string text = message.text;

@@ -664,6 +664,58 @@ TEST_F(SessionTest, LeavesAWorld) {
   EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
 }
 
+// The server answers LeaveWorld at once, but a Spawn only after the next tick.
+TEST_F(SessionTest, RepliesMayArriveAfterTheReplyToLeaveWorld) {
+  const stridewire_world world = Joined();
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_OK);
+  const std::uint64_t spawn = command_;
+  EXPECT_EQ(session_->Remove(world, {0, 0, {2}}, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Observe(world, {}, subscription, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->StopObserving(subscription, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->LeaveWorld(world, command_), STRIDEWIRE_OK);
+  const std::uint64_t leave = command_;
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 5u);
+  (void)Events();
+  Receive(test_world::Ok(std::get<protocol::LeaveWorld>(sent[4]).seq));
+  Receive(SpawnReply(std::get<protocol::Spawn>(sent[0])));
+  Receive(test_world::Ok(std::get<protocol::Remove>(sent[1]).seq));
+  Receive(test_world::Ok(std::get<protocol::Observe>(sent[2]).seq));
+  protocol::Reply stopped = test_world::Ok(std::get<protocol::StopObserving>(sent[3]).seq);
+  stopped.code = protocol::StatusCode::kNoSuchSubscription;
+  Receive(stopped);
+  EXPECT_EQ(session_->state(), State::kReady);
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 5u);
+  for (const auto& event : events) {
+    EXPECT_EQ(event.type, STRIDEWIRE_EVENT_REPLY);
+    EXPECT_EQ(event.status, STRIDEWIRE_OK);
+  }
+  EXPECT_EQ(events[0].command, leave);
+  EXPECT_EQ(events[1].command, spawn);
+  EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
+}
+
+TEST_F(SessionTest, LosesTheSessionAfterTheReplyToLeaveWorld) {
+  const stridewire_world world = Joined();
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->Observe(world, {}, subscription, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->LeaveWorld(world, command_), STRIDEWIRE_OK);
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 2u);
+  (void)Events();
+  Receive(test_world::Ok(std::get<protocol::LeaveWorld>(sent[1]).seq));
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(false);
+  std::vector<int> statuses;
+  for (const auto& event : Events()) {
+    if (event.type == STRIDEWIRE_EVENT_REPLY) statuses.push_back(event.status);
+  }
+  EXPECT_THAT(statuses, testing::ElementsAre(STRIDEWIRE_OK, STRIDEWIRE_SESSION_LOST));
+  EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
+}
+
 TEST_F(SessionTest, StopObservingDiscardsThePoses) {
   const stridewire_world world = Joined();
   std::uint32_t subscription = 0;
