@@ -15,6 +15,7 @@
 #include "runtime/library/locomotion_profile.h"
 #include "runtime/plan/walk_planner.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "stridewire/runtime/terrain.h"
 
 namespace stridewire {
 namespace {
@@ -185,6 +186,27 @@ TEST(Stop, StepsThatCannotCloseAreNotTaken) {
   EXPECT_EQ(steps.feet.size(), 3u);
   EXPECT_GT(FeetApartFromStandM(avatar), 0.5);
   EXPECT_EQ(steps.idle_reason, "the library has no step that brings the feet together from here");
+}
+
+// The last two stones are 0.2 m and 0.4 m high and leave room for one foot each.
+TEST(Stop, FeetStayApartIfThereIsNoGroundBesideThem) {
+  for (const bool has_room : {false, true}) {
+    const double left_m = has_room ? 0.2 : 0.0;
+    TerrainData data;
+    data.boxes.push_back({{0.0, 0.3}, {0.2, 0.7}, 0.2});
+    data.boxes.push_back({{-0.2, 0.8}, {left_m, 1.2}, 0.4});
+    AvatarSimulation avatar(LibraryOf({}), BaseFrame{},
+                            {.terrain = Terrain::Make(std::move(data)).value()});
+    for (const auto& [foot, at] : {std::pair{Foot::kLeft, DVec3(0.08, 0.2, 0.55)},
+                                   std::pair{Foot::kRight, DVec3(-0.08, 0.4, 1.05)}}) {
+      ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.foot = foot, .at = {{at, 0.0}}}}).has_value());
+    }
+    const Played steps = Play(avatar);
+    EXPECT_EQ(steps.feet.size(), has_room ? 3u : 2u);
+    EXPECT_EQ(
+        steps.idle_reason,
+        has_room ? "" : "the ground beside the foot is too high or too low for the other foot");
+  }
 }
 
 TEST(Stop, LibraryThatStandsInAStrideStopsInThatStride) {

@@ -230,6 +230,8 @@ class AvatarSimulation {
   void PrefetchState() const;
   [[nodiscard]] std::optional<RequestPlan> PlanClosingStep() const;
   [[nodiscard]] std::optional<RequestPlan> PlanPlantedClosingStep(Foot foot) const;
+  [[nodiscard]] DVec3 PlaceBeside(Foot fixed) const;
+  [[nodiscard]] bool HasGroundBeside(Foot fixed) const;
   [[nodiscard]] const char* WhyFeetAreApart() const;
   [[nodiscard]] bool StartNext(PlanScratch& scratch);
   [[nodiscard]] WalkDecision PlanNextWalkStep(WalkProgress& progress) const;

@@ -12,6 +12,9 @@ namespace {
 constexpr double kClosingGainM = 0.03;
 // A step that ends this close to the stand needs no help from planting.
 constexpr double kClosedM = 0.03;
+// An avatar does not bring its feet together if they would then stand at heights that differ by
+// more than this and by more than they do now, for example on a stone that has room for one foot.
+constexpr double kMaxStandClimbM = 0.15;
 
 // Returns the forward distance between the feet at the end of a planned step.
 double EndLength(const MotionLibrary& library, const RequestPlan& plan) {
@@ -41,6 +44,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanClosingStep() const {
   const auto plan = closing(feet_, last_moved_);
   if (!plan) return std::nullopt;
   const Foot foot = foot_of(*plan);
+  if (!HasGroundBeside(OtherFoot(foot))) return std::nullopt;
   const double miss_m = miss_of(*plan);
   if (miss_m <= (is_planted ? kClosedM : kFeetApartForwardM)) {
     const double apart_m = std::fabs(feet_.Vector(foot).z - stand_feet_.Vector(foot).z);
@@ -54,12 +58,28 @@ std::optional<RequestPlan> AvatarSimulation::PlanClosingStep() const {
   return second && miss_of(*second) <= largest_miss_m ? plan : std::nullopt;
 }
 
+// Returns the place of a foot in a stand in which `fixed` is the other foot.
+DVec3 AvatarSimulation::PlaceBeside(Foot fixed) const {
+  const DVec3 vector = stand_feet_.Vector(OtherFoot(fixed));
+  return StandingPosition(fixed) + RotateYaw(base_.heading_rad, DVec3(vector.x, 0.0, vector.z));
+}
+
+// Returns true if the ground beside a standing foot is high and low enough for the other foot.
+bool AvatarSimulation::HasGroundBeside(Foot fixed) const {
+  if (options_.terrain == nullptr || !body_.plants_feet) return true;
+  const double fixed_m = StandingPosition(fixed).y;
+  const DVec3 beside = PlaceBeside(fixed);
+  const double climb_m = std::fabs(options_.terrain->HeightAt(beside.x, beside.z) - fixed_m);
+  return climb_m <= kMaxStandClimbM ||
+         climb_m <= std::fabs(StandingPosition(OtherFoot(fixed)).y - fixed_m);
+}
+
 // Plans a step onto the place of a foot beside the other foot. Planting brings the foot there,
 // although the library's own step ends elsewhere.
 std::optional<RequestPlan> AvatarSimulation::PlanPlantedClosingStep(Foot foot) const {
-  const DVec3 vector = stand_feet_.Vector(foot);
+  if (!HasGroundBeside(OtherFoot(foot))) return std::nullopt;
   const DVec3 fixed_m = StandingPosition(OtherFoot(foot));
-  const DVec3 beside_m = fixed_m + RotateYaw(base_.heading_rad, DVec3(vector.x, 0.0, vector.z));
+  const DVec3 beside_m = PlaceBeside(OtherFoot(foot));
   auto plan = PlanRequest(
       {.movement = StepRequest{.foot = foot, .at = FootprintRequest{beside_m, base_.heading_rad}}});
   if (!plan) return plan;
@@ -72,9 +92,10 @@ std::optional<RequestPlan> AvatarSimulation::PlanPlantedClosingStep(Foot foot) c
 
 // Returns the reason why the feet are apart while the avatar stands, or an empty string.
 const char* AvatarSimulation::WhyFeetAreApart() const {
-  return AreFeetApart(feet_, stand_feet_)
+  if (!AreFeetApart(feet_, stand_feet_)) return "";
+  return HasGroundBeside(last_moved_)
              ? "the library has no step that brings the feet together from here"
-             : "";
+             : "the ground beside the foot is too high or too low for the other foot";
 }
 
 }  // namespace stridewire
