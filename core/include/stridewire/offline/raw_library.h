@@ -47,7 +47,7 @@ struct RawLibrary {
   Skeleton skeleton;
   /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
   Pose stand_pose;
-  /// By how much the soles of `stand_pose` are not flat on the ground: 0 in a stand.
+  /// Measures how far the soles of `stand_pose` are from flat on the ground; 0: they are flat.
   /// CompleteLibrary replaces stand poses with tilted soles.
   double stand_tilt_m = 0.0;
   std::vector<RawGroup> groups;

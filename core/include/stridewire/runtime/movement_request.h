@@ -115,7 +115,8 @@ inline constexpr double kMaxLayerSpeed = 4.0;
 inline constexpr double kMaxRequestErrorM = 0.2;
 inline constexpr double kMaxRequestErrorRad = 1.0471975511965976;  ///< 60 degrees.
 
-/// Limits on requests. They only reject nonsense and are far wider than the range of any library.
+/// Limits on requests. They reject absurd values only, and are far wider than the range of any
+/// library.
 inline constexpr double kMaxRequestLengthM = 10.0;  ///< Magnitude of lengths, sides and heights.
 inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;

@@ -150,7 +150,7 @@ class AxesFinder {
 
   // The extent of the sampled motion along an axis, in file units.
   struct Extent {
-    double lowest = 0.0;  // Median of the lowest joint.
+    double lowest = 0.0;  // Median position of the joint that is lowest along the axis.
     double travel = 0.0;  // Range of the root, without the outermost 5 % at both ends.
   };
   Extent ExtentAlong(const DVec3& axis) const {

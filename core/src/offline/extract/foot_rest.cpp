@@ -21,7 +21,8 @@ constexpr double kSameHeightM = 0.04;
 // height on the ground.
 constexpr double kLandingMaxS = 0.2;
 constexpr double kHeelStrikeM = 0.08;
-// A foot comes to rest at a further height if it is at rest for this share of the shortest contact.
+// Before and after a contact, a slow foot also stands at another height if it is at rest there for
+// at least this share of the shortest contact.
 constexpr double kRestMinShare = 0.5;
 
 using Flags = std::vector<char>;

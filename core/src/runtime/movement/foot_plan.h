@@ -38,8 +38,8 @@ struct FootTrajectory {
   /// Coefficients of u, u^2, u^3 and u^4 of a further height to add, where u is the elapsed
   /// fraction of the movement. It keeps the sole of a step's supporting foot on the ground.
   std::array<double, 4> level_m{};
-  /// Peak of a further height to add while the difference pose fades out. Rotations of the legs and
-  /// the height of the root fade differently, so that the foot would sink meanwhile.
+  /// Largest value of another height to add while the difference pose fades out. Otherwise the foot
+  /// would sink, because the rotations of the legs and the height of the root fade differently.
   double settle_lift_m = 0.0;
   /// Lock the height of the ball as well. A standing avatar needs that, because its legs straighten
   /// while its feet must stay on the ground.

@@ -31,7 +31,7 @@ constexpr double kAimedM = 0.02;
 constexpr double kAimedRad = 0.5;
 constexpr double kAimedBodyRad = 0.25;
 
-// Effort of turning by one radian, in metres. Within kNearM of the goal the direction of the way
+// Effort of turning by one radian, in metres. Within kNearM of the goal the direction of the path
 // counts less, because the last steps lead in any direction.
 constexpr double kTurnEffort = 0.3;
 constexpr double kNearM = 0.5;
@@ -258,9 +258,9 @@ bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   const double walking_s = turning_s(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
                            kStrideS * PartCount(remaining_m, StepM()) + kQuickStepS +
                            turning_s(WrapAngle(approach_.heading_rad - way_rad), kSpotTurn.out_rad);
-  // While it steps, the body turns to its final heading, so the way leads in a direction between
-  // those of both headings. With the present heading, walks would prefer the one at one step and
-  // the other at the next, and zigzag.
+  // The body turns to its final heading while it steps, so the path is measured from the heading
+  // midway between the current and the final one. Measured from the current heading, the preferred
+  // kind of step would change from step to step, and walks would zigzag.
   const double turn_rad = WrapAngle(approach_.heading_rad - body.heading_rad);
   const DVec3 local = RotateYaw(-body.heading_rad - 0.5 * turn_rad, way);
   const double along_s =
