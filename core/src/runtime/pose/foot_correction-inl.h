@@ -119,11 +119,14 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   c.free_turn = free;
 
   // The heading of a standing foot is locked while its sole is on the ground, and free with the
-  // heel up: seen from above, a foot on its toes is too short to have a heading.
+  // heel up: seen from above, a foot on its toes is too short to have a heading. If the ankle passes
+  // over the ball, the direction from ankle to ball is reversed and is not a heading either.
   const Number print_heading = Select(has_landed, trajectory.to_heading, trajectory.from_heading);
   const Number error = WrapAngle(print_heading - heading - free);
+  const Number ahead =
+      EaseOut(DivideBy(Max(error, -error) - Constant<Number>(kAheadRad), kReversedRad - kAheadRad));
   const Number lock =
-      one - EaseOut(DivideBy(flatness - Constant<Number>(kHeelUp), kSoleDown - kHeelUp));
+      ahead * (one - EaseOut(DivideBy(flatness - Constant<Number>(kHeelUp), kSoleDown - kHeelUp)));
   c.turn =
       Select(is_planted, free + lock * error, free + (one - c.turned) * trajectory.release_turn);
   c.root_shift = trajectory.root_shift * (one - EaseOut(timing.OfDuration(t)));

@@ -51,6 +51,10 @@ inline constexpr LiftCurve kLiftCurves[3] = {
 // at which it is complete (kSoleDown).
 inline constexpr double kHeelUp = 0.5;
 inline constexpr double kSoleDown = 0.8;
+// Angle between the direction from ankle to ball and the footprint at which the lock is complete
+// (kAheadRad) and at which it is zero (kReversedRad).
+inline constexpr double kAheadRad = 1.0;
+inline constexpr double kReversedRad = 2.0;
 
 // A leg with a shorter thigh or shank cannot be planted.
 inline constexpr float kSmallestBoneM = 1e-3f;
