@@ -119,8 +119,8 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   c.free_turn = free;
 
   // The heading of a standing foot is locked while its sole is on the ground, and free with the
-  // heel up: seen from above, a foot on its toes is too short to have a heading. If the ankle passes
-  // over the ball, the direction from ankle to ball is reversed and is not a heading either.
+  // heel up: seen from above, a foot on its toes is too short to have a heading. Once the ankle has
+  // passed the ball, the direction from ankle to ball is reversed and is not a heading either.
   const Number print_heading = Select(has_landed, trajectory.to_heading, trajectory.from_heading);
   const Number error = WrapAngle(print_heading - heading - free);
   const Number ahead =
