@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "base/check.h"
 #include "pose_history.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
@@ -66,7 +67,6 @@ void PoseRecording::Clear() {
 double PoseRecording::first_time_s() const {
   double first_s = std::numeric_limits<double>::quiet_NaN();
   for (const auto& [key, stream] : streams_) {
-    if (stream.ticks.empty()) continue;
     first_s = std::fmin(first_s, stream.ticks.front().info.server_time_s);
   }
   return first_s;
@@ -80,20 +80,22 @@ void PoseRecording::Discard(Stream& stream, const Tick& tick) {
 
 void PoseRecording::DropOld() {
   for (;;) {
-    Stream* oldest = nullptr;
-    for (auto& [key, stream] : streams_) {
-      if (stream.ticks.empty()) continue;
-      if (oldest == nullptr ||
-          stream.ticks.front().info.server_time_s < oldest->ticks.front().info.server_time_s) {
-        oldest = &stream;
+    auto oldest = streams_.end();
+    for (auto it = streams_.begin(); it != streams_.end(); ++it) {
+      STRIDEWIRE_CHECK(!it->second.ticks.empty());
+      if (oldest == streams_.end() || it->second.ticks.front().info.server_time_s <
+                                          oldest->second.ticks.front().info.server_time_s) {
+        oldest = it;
       }
     }
-    if (oldest == nullptr) return;
-    const Tick& tick = oldest->ticks.front();
+    if (oldest == streams_.end()) return;
+    auto& [key, stream] = *oldest;
+    const Tick& tick = stream.ticks.front();
     if (tick.info.server_time_s >= last_time_s_ - length_s_ && bytes_ <= max_bytes_) return;
-    Discard(*oldest, tick);
+    Discard(stream, tick);
     bytes_ -= tick.bytes;
-    oldest->ticks.pop_front();
+    stream.ticks.pop_front();
+    if (stream.ticks.empty()) streams_.erase(oldest);  // Frees the decoded poses, too.
   }
 }
 
