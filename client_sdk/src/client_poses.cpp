@@ -92,6 +92,7 @@ void WriteRaw(const PoseHistory& history, std::size_t index, stridewire_pose* po
   pose->discontinuity = stamp.discontinuity ? 1 : 0;
   pose->standing = stamp.standing ? 1 : 0;
   pose->detail = static_cast<std::uint8_t>(stamp.detail);
+  pose->segment = stamp.segment;
   CopyVector(history.root_position_m(index), pose->root_position_m);
   WriteRotations(history.rotations(index), pose->rotations_xyzw);
 }
@@ -244,6 +245,7 @@ stridewire_status stridewire_client_sample_pose(stridewire_client* client, strid
         pose->held_s = sampled->interpolated ? 0.0 : time_s - stamp.time_s;
         pose->standing = stamp.standing ? 1 : 0;
         pose->detail = static_cast<std::uint8_t>(stamp.detail);
+        pose->segment = stamp.segment;
         CopyVector(root_position_m, pose->root_position_m);
         WriteRotations(joints, pose->rotations_xyzw);
       });

@@ -11,11 +11,12 @@ namespace stridewire::client {
 
 /// Properties of a sampled pose.
 enum CrowdFlags : std::uint8_t {
-  kCrowdDiscontinuity = 1,  ///< The received pose does not continue the previous one.
-  kCrowdStanding = 2,       ///< The avatar stands and its queue is empty.
-  kCrowdHeld = 4,           ///< The pose is not interpolated, because no continuous pose follows.
-  kCrowdReduced = 8,        ///< The server sent the pose with PoseDetail::kReduced.
-  kCrowdRoot = 16,          ///< The server sent the pose with PoseDetail::kRoot.
+  /// The last received pose at or before the sampled time does not continue the previous one.
+  kCrowdDiscontinuity = 1,
+  kCrowdStanding = 2,  ///< The avatar stands and its queue is empty.
+  kCrowdHeld = 4,      ///< The pose is not interpolated, because no continuous pose follows.
+  kCrowdReduced = 8,   ///< The server sent the pose with PoseDetail::kReduced.
+  kCrowdRoot = 16,     ///< The server sent the pose with PoseDetail::kRoot.
 };
 
 /// Returns the flags of a received pose.

@@ -196,13 +196,12 @@ void PoseRecording::Interpolate(const Neighbours& around, double time_s, CrowdPo
     if (place == out.avatars.end() || *place != avatar) continue;
     const auto o = static_cast<std::size_t>(place - out.avatars.begin());
     const auto rotations = std::span(out.rotations).subspan(o * joints, joints);
-    const auto lasting = static_cast<std::uint8_t>(start.flags[i] & ~kCrowdDiscontinuity);
     std::size_t end = 0;
     if (!find(around.end, avatar, end)) {
       out.roots_m[o] = start.roots_m[i];
       std::ranges::copy(around.start->pose(i).rotations, rotations.begin());
       out.flags[o] =
-          around.exact ? start.flags[i] : static_cast<std::uint8_t>(lasting | kCrowdHeld);
+          around.exact ? start.flags[i] : static_cast<std::uint8_t>(start.flags[i] | kCrowdHeld);
       continue;
     }
     std::size_t before = 0;
@@ -219,7 +218,7 @@ void PoseRecording::Interpolate(const Neighbours& around, double time_s, CrowdPo
          .end = around.end->pose(end),
          .beyond = last->pose(has_beyond ? beyond : end)},
         time_s, out.roots_m[o], rotations);
-    out.flags[o] = lasting;
+    out.flags[o] = start.flags[i];
   }
 }
 

@@ -137,6 +137,8 @@ WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
 void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose,
                      Counts& counts) {
   stamp.discontinuity |= track.epoch != epoch_;
+  if (stamp.discontinuity) track.segment = ++last_segment_;
+  stamp.segment = track.segment;
   if (track.history->Push(stamp, pose.root_position_m, pose.rotations)) {
     ++counts.poses;
     track.epoch = epoch_;
@@ -282,9 +284,7 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, std::uint64_t& held) co
     const auto sampled = history.Sample(time_s, out.roots_m[count], rotations);
     if (!sampled) return;
     const PoseStamp& stamp = history.stamp(sampled->index);
-    const bool exact = stamp.time_s == time_s;
     int flags = CrowdFlagsOf(stamp);
-    if (!exact) flags &= ~kCrowdDiscontinuity;
     if (!sampled->interpolated) flags |= kCrowdHeld;
     if (!sampled->interpolated && is_after_newest) ++held;
     out.avatars[count] = avatar;

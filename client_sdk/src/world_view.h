@@ -131,6 +131,7 @@ class WorldView : public PoseSink {
     protocol::PoseMode mode = protocol::PoseMode::kFull;
     std::uint64_t seen_tick = 0;
     std::uint64_t epoch = 0;
+    std::uint32_t segment = 0;  ///< Segment of the newest pose.
     bool gone = false;
   };
   struct Shard {
@@ -173,6 +174,8 @@ class WorldView : public PoseSink {
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;
+  /// Last assigned segment. It is never reset, so that poses of different sessions differ.
+  std::uint32_t last_segment_ = 0;
   std::uint64_t revision_ = 0;
   PoseRecording recording_;
   double newest_time_s_ = -std::numeric_limits<double>::infinity();

@@ -14,7 +14,7 @@ MAX_TERRAIN_BOXES = 65536
 MAX_PARAMETERS = 7
 MAX_WAYPOINTS = 64
 MAX_RATE_RINGS = 4
-ABI_VERSION = 5
+ABI_VERSION = 6
 
 
 class stridewire_client_options(c.Structure):
@@ -279,6 +279,7 @@ class stridewire_pose(c.Structure):
         ("detail", c.c_uint8),
         ("rotations_xyzw", c.POINTER(c.c_float)),
         ("joint_capacity", c.c_size_t),
+        ("segment", c.c_uint32),
     ]
 
 

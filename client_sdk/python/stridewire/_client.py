@@ -405,7 +405,7 @@ class World:
         return Pose(PoseKind(pose.kind), pose.tick, pose.time_s,
                     np.array(pose.root_position_m, np.float32),
                     self._rotations[:pose.joint_count].copy(), bool(pose.discontinuity),
-                    bool(pose.standing))
+                    bool(pose.standing), pose.segment)
 
     def pose(self, avatar: int) -> Pose | None:
         """Returns the newest received pose; None if there is none yet."""

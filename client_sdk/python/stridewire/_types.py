@@ -170,8 +170,11 @@ class Pose:
     root_position_m: NDArray[np.float32]  #: Shape (3,), in the world.
     #: Shape (joints, 4). The first rotation is in the world, the others relative to the parent.
     rotations_xyzw: NDArray[np.float32]
-    discontinuity: bool  #: True: do not interpolate between the pose before and this one.
+    discontinuity: bool  #: RAW: True if one must not interpolate between the pose before and this.
     standing: bool  #: True: the avatar stands and has no request.
+    #: Number of the continuous motion, also of sampled poses. Poses of different segments must not
+    #: be blended, because the avatar has teleported or the client has reconnected in between.
+    segment: int
 
 
 @dataclass(frozen=True)

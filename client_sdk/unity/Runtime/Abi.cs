@@ -497,6 +497,7 @@ namespace Stridewire
         public byte detail;
         public float* rotations_xyzw;
         public UIntPtr joint_capacity;
+        public uint segment;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -535,7 +536,7 @@ namespace Stridewire
         public const int MaxParameters = 7;
         public const int MaxWaypoints = 64;
         public const int MaxRateRings = 4;
-        public const int AbiVersion = 5;
+        public const int AbiVersion = 6;
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern byte* stridewire_status_name(
@@ -788,7 +789,7 @@ namespace Stridewire
             if (sizeof(stridewire_layer_name) != 65) return "stridewire_layer_name";
             if (sizeof(stridewire_terrain) != 40) return "stridewire_terrain";
             if (sizeof(stridewire_terrain_buffers) != 32) return "stridewire_terrain_buffers";
-            if (sizeof(stridewire_pose) != 64) return "stridewire_pose";
+            if (sizeof(stridewire_pose) != 72) return "stridewire_pose";
             if (sizeof(stridewire_statistics) != 136) return "stridewire_statistics";
             return null;
         }

@@ -127,8 +127,12 @@ namespace Stridewire
         public double HeldS;
         /// <summary>World position of joint 0.</summary>
         public Position RootPosition;
-        /// <summary>True: do not interpolate between the pose before and this one.</summary>
+        /// <summary>PoseKind.Raw: true if clients must not interpolate between the pose before and
+        /// this one.</summary>
         public bool Discontinuity;
+        /// <summary>Number of the continuous motion. If it differs from that of the pose that was
+        /// displayed before, the two must not be blended.</summary>
+        public uint Segment;
         /// <summary>True: the avatar stands and has no request.</summary>
         public bool Standing;
         public PoseDetail Detail;

@@ -338,6 +338,7 @@ namespace Stridewire
             float* root = native->root_position_m;
             pose.RootPosition = new Position(root[0], root[1], root[2]);
             pose.Discontinuity = native->discontinuity != 0;
+            pose.Segment = native->segment;
             pose.Standing = native->standing != 0;
             pose.Detail = (PoseDetail)native->detail;
             return native->kind != PoseKind.Missing;

@@ -10,6 +10,7 @@ export function createPose(jointCount = 0): Pose {
     standing: false,
     detail: 'all',
     heldS: 0,
+    segment: 0,
   };
 }
 

@@ -517,11 +517,15 @@ export interface Pose {
   detail: PoseDetail;
   /** If the pose is held: time since the last received pose. Otherwise 0. */
   heldS: number;
+  /** Number of the continuous motion. If it differs from that of the pose that was displayed
+   * before, the avatar has teleported, or the client has reconnected in between: do not blend the
+   * two poses. */
+  segment: number;
 }
 
 /** Bits of `CrowdPose.flags`. */
 export const PoseFlag = {
-  /** The received pose does not continue the previous one. */
+  /** The last received pose at or before the sampled time does not continue the previous one. */
   discontinuity: 1,
   /** The avatar stands and its queue is empty. */
   standing: 2,

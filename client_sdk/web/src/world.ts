@@ -127,7 +127,7 @@ export class WorldHandle implements World {
     this.session.recordSample(this, timeS);
     const kind = native().call.sample(this.session.client, this.handle, avatar, timeS);
     if (kind === 0) return 'missing';
-    const [joints, rootAt, rotationsAt, tick, flags, heldS] = native().results;
+    const [joints, rootAt, rotationsAt, tick, flags, heldS, segment] = native().results;
     if (out.rotations.length < 4 * joints!) out.rotations = new Float32Array(4 * joints!);
     out.rootM.set(this.roots.get(rootAt!, 3));
     out.rotations.set(this.rotations.get(rotationsAt!, 4 * joints!));
@@ -137,6 +137,7 @@ export class WorldHandle implements World {
     out.detail = (flags! & PoseFlag.reducedJoints) !== 0 ? 'reduced'
         : (flags! & PoseFlag.rootOnly) !== 0 ? 'root' : 'all';
     out.heldS = heldS!;
+    out.segment = segment!;
     return kind === 1 ? 'interpolated' : 'held';
   }
 

@@ -490,7 +490,7 @@ STRIDEWIRE_EXPORT(avatars) std::size_t Avatars(Client* client, stridewire_world 
 
 /// Samples one avatar. Returns 0 if its pose is missing, 1 if it is interpolated and 2 if it is
 /// held. results: 0 number of joints, 1 address of the root's position, 2 address of the rotations,
-/// 3 tick, 4 flags (CrowdFlags), 5 time since the last pose if it is held.
+/// 3 tick, 4 flags (CrowdFlags), 5 time since the last pose if it is held, 6 segment.
 STRIDEWIRE_EXPORT(sample)
 std::uint32_t Sample(Client* client, stridewire_world world, protocol::AvatarId avatar,
                      double time_s) {
@@ -510,6 +510,7 @@ std::uint32_t Sample(Client* client, stridewire_world world, protocol::AvatarId 
   results[3] = static_cast<double>(stamp.tick);
   results[4] = CrowdFlagsOf(stamp);
   results[5] = sampled->interpolated ? 0.0 : time_s - stamp.time_s;
+  results[6] = stamp.segment;
   return sampled->interpolated ? 1 : 2;
 }
 

@@ -760,6 +760,11 @@ TEST(ClientAndServer, ATeleportEndsRequestsAndMovesTheAvatar) {
   ASSERT_TRUE(user.client.Observe(user.world));
   ASSERT_TRUE(user.client.Request(user.world, {client::Stand(1, 7, 100.0)}));
   ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_STARTED));
+  client::Pose before;
+  ASSERT_TRUE(Eventually([&] {
+    const auto time_s = user.client.RenderTime();
+    return time_s && user.client.SamplePose(user.world, 1, *time_s, before) && !before.missing();
+  }));
   EXPECT_EQ(user.client.Teleport(user.world, {{0, {}, 0.0}}).status(), STRIDEWIRE_INVALID_ARGUMENT);
   ASSERT_TRUE(user.client.Teleport(user.world, {{1, {20.0, 0.0, 5.0}, 0.0}}));
   const auto ended = user.Next(STRIDEWIRE_EVENT_REJECTED);
@@ -772,6 +777,13 @@ TEST(ClientAndServer, ATeleportEndsRequestsAndMovesTheAvatar) {
   EXPECT_TRUE(Eventually([&] {
     return user.client.LatestPose(user.world, 1, pose) && !pose.missing() &&
            std::abs(pose.root_position_m[0] - 20.0f) < 0.1f;
+  }));
+  // Sampled poses before and after the teleport belong to different segments.
+  EXPECT_NE(pose.segment, before.segment);
+  EXPECT_TRUE(Eventually([&] {
+    if (!user.client.SamplePose(user.world, 1, *user.client.RenderTime(), pose)) return false;
+    EXPECT_EQ(pose.segment == before.segment, pose.root_position_m[0] < 10.0f);
+    return pose.segment != before.segment;
   }));
 
   // The ids of living avatars cannot be used again.

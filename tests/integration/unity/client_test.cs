@@ -184,6 +184,19 @@ static class ClientTest
             RequireEqual(world.ListAvatars(ids), 1, "avatars");
             RequireEqual(ids[0], 3u, "avatar");
 
+            Require(world.Latest(3, rotations, out pose), "pose before a teleport");
+            uint segment = pose.Segment;
+            RequireEqual(WaitReply(client, world.Teleport(3, new Position(4, 0, 2))).Status,
+                         Status.Ok, "teleport");
+            for (int tries = 0; tries < 100 && pose.Segment == segment; ++tries)
+            {
+                System.Threading.Thread.Sleep(50);
+                client.TryGetRenderTime(out time);
+                Require(world.Sample(3, time, rotations, out pose), "pose during a teleport");
+                RequireEqual(pose.Segment == segment, pose.RootPosition.X < 2.5, "segment");
+            }
+            Require(pose.RootPosition.X > 2.5, "the avatar is at its new place");
+
             AllocatesNothing(client, world, rotations);
             FollowsRig(skeleton, rotations);
             RequireEqual(WaitReply(client, world.StopObserving(subscription)).Status, Status.Ok,

@@ -9,7 +9,7 @@
 #define OFFSET(type, field, bytes) \
   _Static_assert(offsetof(type, field) == (bytes), "offset of " #type "." #field)
 
-_Static_assert(STRIDEWIRE_ABI_VERSION == 5, "the numbers below belong to this version");
+_Static_assert(STRIDEWIRE_ABI_VERSION == 6, "the numbers below belong to this version");
 
 #if UINTPTR_MAX == UINT64_MAX
 
@@ -29,6 +29,10 @@ OFFSET(stridewire_client_options, client_name, 72);
 OFFSET(stridewire_client_options, auth_token, 80);
 OFFSET(stridewire_client_options, respawn, 88);
 OFFSET(stridewire_client_options, library_folder, 96);
+
+SIZE(stridewire_address, 16);
+OFFSET(stridewire_address, host, 0);
+OFFSET(stridewire_address, port, 8);
 
 SIZE(stridewire_spawn, 40);
 OFFSET(stridewire_spawn, avatar, 0);
@@ -199,7 +203,7 @@ OFFSET(stridewire_terrain_buffers, height_capacity, 8);
 OFFSET(stridewire_terrain_buffers, boxes, 16);
 OFFSET(stridewire_terrain_buffers, box_capacity, 24);
 
-SIZE(stridewire_pose, 64);
+SIZE(stridewire_pose, 72);
 OFFSET(stridewire_pose, kind, 0);
 OFFSET(stridewire_pose, joint_count, 4);
 OFFSET(stridewire_pose, tick, 8);
@@ -211,6 +215,7 @@ OFFSET(stridewire_pose, standing, 45);
 OFFSET(stridewire_pose, detail, 46);
 OFFSET(stridewire_pose, rotations_xyzw, 48);
 OFFSET(stridewire_pose, joint_capacity, 56);
+OFFSET(stridewire_pose, segment, 64);
 
 SIZE(stridewire_statistics, 136);
 OFFSET(stridewire_statistics, bytes_received, 0);

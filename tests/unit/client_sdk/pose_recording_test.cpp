@@ -86,7 +86,7 @@ TEST_F(PoseRecordingTest, DoesNotInterpolateAcrossDiscontinuities) {
   EXPECT_EQ(Recorded(61.5 / 60.0).roots_m[0].x, 1.0f);
   EXPECT_EQ(recorded_.flags[0], kCrowdHeld);
   EXPECT_EQ(Recorded(62.5 / 60.0).roots_m[0].x, 50.0f);
-  EXPECT_EQ(recorded_.flags[0], kCrowdHeld);
+  EXPECT_EQ(recorded_.flags[0], kCrowdHeld | kCrowdDiscontinuity);
   EXPECT_EQ(Recorded(62.0 / 60.0).flags[0], kCrowdDiscontinuity);
 }
 

@@ -390,6 +390,7 @@ TEST_F(SessionTest, DiscardsPosesAfterALostSession) {
   Receive(test_world::Ok(std::get<protocol::Observe>(Sent().at(0)).seq));
   session_->OnBytes(test_world::PoseFrame(5, 6000, {{1}}), now_s_);
   EXPECT_TRUE(session_->clock().ready());
+  const std::uint32_t segment = session_->FindWorld(world)->Find(1)->stamp(0).segment;
   session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
   Ready(false);
   EXPECT_FALSE(session_->clock().ready());
@@ -398,6 +399,7 @@ TEST_F(SessionTest, DiscardsPosesAfterALostSession) {
   session_->OnBytes(test_world::PoseFrame(5, 3, {{1}}), now_s_);  // ticks start again
   ASSERT_NE(session_->FindWorld(world)->Find(1), nullptr);
   EXPECT_TRUE(session_->FindWorld(world)->Find(1)->stamp(0).discontinuity);
+  EXPECT_NE(session_->FindWorld(world)->Find(1)->stamp(0).segment, segment);
 }
 
 protocol::TerrainInfo Slab(double height_m) {
@@ -821,6 +823,62 @@ TEST_F(SessionTest, ReconnectsAfterAServerShutdown) {
   EXPECT_THAT(EventTypes(),
               testing::ElementsAre(STRIDEWIRE_EVENT_CONNECTION_LOST, STRIDEWIRE_EVENT_CONNECTED,
                                    STRIDEWIRE_EVENT_SESSION_LOST));
+}
+
+TEST_F(SessionTest, TriesAllAddressesBeforeItWaits) {
+  EXPECT_EQ(session_->Open(now_s_, {"a:1", "b:2", "c:3"}), STRIDEWIRE_OK);
+  for (int round = 0; round < 3; ++round) {
+    for (std::size_t address = 0; address < 3; ++address) {
+      ASSERT_TRUE(session_->ConnectDue(now_s_)) << round << ' ' << address;
+      session_->StartConnecting(now_s_);
+      EXPECT_EQ(session_->address_index(), address);
+      session_->OnLost(STRIDEWIRE_CONNECT_FAILED, "refused", now_s_);
+    }
+    EXPECT_FALSE(session_->ConnectDue(now_s_));
+    const double delay_s = session_->NextTime() - now_s_;
+    EXPECT_GE(delay_s, 0.5 * Backoff::kFirstS * (1 << round));
+    EXPECT_LE(delay_s, Backoff::kFirstS * (1 << round));
+    now_s_ = session_->NextTime();
+  }
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 9u);
+  EXPECT_EQ(events[1].type, STRIDEWIRE_EVENT_CONNECT_FAILED);
+  EXPECT_STREQ(events[1].text, "b:2: refused");
+}
+
+TEST_F(SessionTest, ReturnsToTheServerThatCanResumeTheSession) {
+  EXPECT_EQ(session_->Open(now_s_, {"a:1", "b:2"}), STRIDEWIRE_OK);
+  session_->StartConnecting(now_s_);
+  session_->OnLost(STRIDEWIRE_CONNECT_FAILED, "refused", now_s_);
+  Ready();
+  EXPECT_EQ(session_->address_index(), 1u);
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[1].type, STRIDEWIRE_EVENT_CONNECTED);
+  EXPECT_STREQ(events[1].text, "b:2");
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  EXPECT_FALSE(session_->ConnectDue(now_s_));
+  EXPECT_FALSE(Connect().resume_token.empty());
+  EXPECT_EQ(session_->address_index(), 1u);
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  EXPECT_TRUE(session_->ConnectDue(now_s_));  // The other server, at once.
+  session_->StartConnecting(now_s_);
+  EXPECT_EQ(session_->address_index(), 0u);
+}
+
+TEST_F(SessionTest, MovesToTheNextAddressWhenTheServerShutsDown) {
+  EXPECT_EQ(session_->Open(now_s_, {"a:1", "b:2"}), STRIDEWIRE_OK);
+  Ready();
+  (void)Events();
+  Receive(protocol::Goodbye{protocol::StatusCode::kShuttingDown, "see you"});
+  EXPECT_LE(session_->NextTime() - now_s_, Backoff::kFirstS);
+  EXPECT_GT(session_->NextTime(), now_s_);  // Not all clients move at the same time.
+  EXPECT_TRUE(Connect().resume_token.empty());
+  EXPECT_EQ(session_->address_index(), 1u);
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_SHUTTING_DOWN);
+  EXPECT_STREQ(events[0].text, "a:1: see you");
 }
 
 TEST_F(SessionTest, TimesOutIfTheServerIsSilent) {

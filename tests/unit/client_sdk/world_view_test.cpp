@@ -73,11 +73,15 @@ TEST_F(WorldViewTest, SamplesAllAvatarsAtATime) {
   std::uint64_t held = 0;
   view_.SampleAll(60.5 / 60.0, crowd, held);
   EXPECT_EQ(crowd.avatars, (std::vector<std::uint32_t>{1, 2}));
-  EXPECT_EQ(crowd.flags, (std::vector<std::uint8_t>{0, kCrowdStanding}));
+  // The first poses continue nothing.
+  EXPECT_EQ(crowd.flags,
+            (std::vector<std::uint8_t>{kCrowdDiscontinuity, kCrowdDiscontinuity | kCrowdStanding}));
   EXPECT_NEAR(crowd.roots_m[1].z, test_world::RootAt(60.5 / 60.0, 2).z, 1e-5f);
   EXPECT_EQ(crowd.rotations.size(), 2u * test_world::kJoints);
   EXPECT_EQ(held, 0u);
-  view_.SampleAll(62.5 / 60.0, crowd, held);  // Avatar 1 is gone.
+  view_.SampleAll(61.5 / 60.0, crowd, held);
+  EXPECT_EQ(crowd.flags, std::vector<std::uint8_t>{kCrowdStanding});  // Avatar 1 is gone.
+  view_.SampleAll(62.5 / 60.0, crowd, held);
   EXPECT_EQ(crowd.avatars, std::vector<std::uint32_t>{2});
   EXPECT_EQ(crowd.flags[0], kCrowdStanding | kCrowdHeld);
   EXPECT_EQ(held, 1u);
@@ -193,6 +197,9 @@ TEST_F(WorldViewTest, BreakMarksTheNextPoseOfEachAvatar) {
   EXPECT_FALSE(history.stamp(1).discontinuity);
   EXPECT_TRUE(history.stamp(2).discontinuity);
   EXPECT_FALSE(history.stamp(3).discontinuity);
+  EXPECT_EQ(history.stamp(0).segment, history.stamp(1).segment);
+  EXPECT_NE(history.stamp(1).segment, history.stamp(2).segment);
+  EXPECT_EQ(history.stamp(2).segment, history.stamp(3).segment);
   EXPECT_EQ(counts_.missing, 0u);  // these ticks were not expected
 }
 

@@ -50,7 +50,7 @@ extern "C" {
 #endif
 
 /// Version of the struct layouts in this header. stridewire_client_create rejects other versions.
-#define STRIDEWIRE_ABI_VERSION 5
+#define STRIDEWIRE_ABI_VERSION 6
 
 /// Returns the version of the library, for example "0.1.0".
 const char* stridewire_version(void);
@@ -697,6 +697,10 @@ typedef struct stridewire_pose {
   /// all others are relative to the parent joint. May be NULL if `joint_capacity` is 0.
   float* rotations_xyzw;
   size_t joint_capacity;  ///< Set by the caller: number of joints that `rotations_xyzw` can hold.
+  /// Number of the continuous motion to which the pose belongs, also if it is sampled. If it
+  /// differs from that of the pose that was displayed before, the avatar has teleported, or the
+  /// client has reconnected in between: the application must not blend the two poses.
+  uint32_t segment;
 } stridewire_pose;
 
 /// Samples the pose of an avatar at a server time. The result for an unknown avatar is
