@@ -5,13 +5,17 @@
 #include <condition_variable>
 #include <cstring>
 #include <random>
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "client_handle.h"
 #include "stridewire/protocol/check.h"
 
 using stridewire::client::Change;
 using stridewire::client::InRange;
+using stridewire::client::NetworkThread;
 using stridewire::client::Query;
 using stridewire::client::Session;
 using stridewire::client::SessionOptions;
@@ -112,12 +116,30 @@ void stridewire_client_destroy(stridewire_client* client) {
 
 stridewire_status stridewire_client_connect(stridewire_client* client, const char* host,
                                             uint16_t port) {
-  if (host == nullptr || *host == '\0' || std::strlen(host) > kMaxHostBytes || port == 0) {
+  const stridewire_address address{host, port};
+  return stridewire_client_connect_any(client, &address, 1);
+}
+
+stridewire_status stridewire_client_connect_any(stridewire_client* client,
+                                                const stridewire_address* addresses, size_t count) {
+  if (addresses == nullptr || count == 0 || count > STRIDEWIRE_MAX_ADDRESSES) {
     return STRIDEWIRE_INVALID_ARGUMENT;
   }
+  for (const stridewire_address& address : std::span(addresses, count)) {
+    if (address.host == nullptr || *address.host == '\0' ||
+        std::strlen(address.host) > kMaxHostBytes || address.port == 0) {
+      return STRIDEWIRE_INVALID_ARGUMENT;
+    }
+  }
   return Change(client, [&](Session& session) {
-    const stridewire_status status = session.Open(client->network.Now());
-    if (status == STRIDEWIRE_OK) client->network.SetTarget(host, port);
+    std::vector<NetworkThread::Target> targets;
+    std::vector<std::string> texts;
+    for (const stridewire_address& address : std::span(addresses, count)) {
+      targets.push_back({address.host, address.port});
+      texts.push_back(targets.back().Text());
+    }
+    const stridewire_status status = session.Open(client->network.Now(), std::move(texts));
+    if (status == STRIDEWIRE_OK) client->network.SetTargets(std::move(targets));
     return status;
   });
 }

@@ -66,8 +66,7 @@ struct NetworkThread::Impl {
     ConnectionPtr to_start;
     ConnectionPtr to_write;
     std::optional<LibraryTask> task;
-    std::string host;
-    std::uint16_t port = 0;
+    Target target;
     {
       const std::lock_guard lock(mutex);
       const double now_s = Now();
@@ -81,8 +80,7 @@ struct NetworkThread::Impl {
         session.StartConnecting(now_s);
         connection = std::make_shared<Connection>(io, session.connection_number());
         to_start = connection;
-        host = target_host;
-        port = target_port;
+        target = targets.at(session.address_index());
       }
       if (connection && connection->connected && !connection->writing &&
           session.TakeOutput(connection->output)) {
@@ -91,7 +89,7 @@ struct NetworkThread::Impl {
       }
     }
     changed.notify_all();
-    if (to_start) Start(to_start, host, port);
+    if (to_start) Start(to_start, target);
     if (to_write) Write(to_write);
     if (task) RunTask(*task);
   }
@@ -116,7 +114,8 @@ struct NetworkThread::Impl {
 
   [[nodiscard]] bool IsCurrent(const ConnectionPtr& c) const { return connection == c; }
 
-  void Start(const ConnectionPtr& c, const std::string& host, std::uint16_t port) {
+  void Start(const ConnectionPtr& c, const Target& target) {
+    const auto& [host, port] = target;
     error_code not_numeric;
     const auto address = asio::ip::make_address(host, not_numeric);
     if (!not_numeric) {
@@ -125,7 +124,8 @@ struct NetworkThread::Impl {
       return;
     }
     c->resolver.async_resolve(
-        host, std::to_string(port), [this, c, host](const error_code& error, const auto& results) {
+        host, std::to_string(port),
+        [this, c, host = host](const error_code& error, const auto& results) {
           if (!IsCurrent(c)) return;
           if (error) {
             return Lost(c, STRIDEWIRE_HOST_NOT_FOUND,
@@ -198,8 +198,7 @@ struct NetworkThread::Impl {
   std::mutex& mutex;
   std::condition_variable& changed;
   Session& session;
-  std::string target_host;
-  std::uint16_t target_port = 0;
+  std::vector<Target> targets;
   const std::chrono::steady_clock::time_point start = std::chrono::steady_clock::now();
   asio::io_context io{1};
   asio::steady_timer timer;
@@ -218,10 +217,12 @@ NetworkThread::~NetworkThread() {
   impl_->thread.join();
 }
 
-void NetworkThread::SetTarget(std::string host, std::uint16_t port) {
-  impl_->target_host = std::move(host);
-  impl_->target_port = port;
+std::string NetworkThread::Target::Text() const {
+  const bool is_ipv6 = host.find(':') != std::string::npos;
+  return (is_ipv6 ? "[" + host + "]" : host) + ":" + std::to_string(port);
 }
+
+void NetworkThread::SetTargets(std::vector<Target> targets) { impl_->targets = std::move(targets); }
 
 void NetworkThread::Wake() {
   if (impl_->wake_posted.exchange(true)) return;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "session.h"
 
@@ -21,8 +22,17 @@ class NetworkThread {
   NetworkThread(const NetworkThread&) = delete;
   NetworkThread& operator=(const NetworkThread&) = delete;
 
-  /// Sets the server for the next attempt to connect. The caller holds the mutex.
-  void SetTarget(std::string host, std::uint16_t port);
+  /// Address of a server.
+  struct Target {
+    std::string host;
+    std::uint16_t port = 0;
+    /// Returns "HOST:PORT", or "[HOST]:PORT" if the host is an IPv6 address.
+    [[nodiscard]] std::string Text() const;
+  };
+
+  /// Sets the servers for the next attempts to connect, by the session's index of addresses. The
+  /// caller holds the mutex. `targets` must not be empty.
+  void SetTargets(std::vector<Target> targets);
 
   /// Makes the thread process the session soon. Callable from any thread.
   void Wake();

@@ -185,13 +185,36 @@ void Session::LoseConnection(stridewire_status status, std::string_view text, do
   if (was_ready && now_s - ready_s_ >= kStableS) backoff_.Reset();
   if (!was_ready) ++connect_failures_;
   state_ = State::kWaiting;
-  next_attempt_s_ = now_s + backoff_.Next();
+  if (addresses_.size() > 1) {
+    last_text_ = addresses_[address_] + ": " + last_text_;
+  }
+  ScheduleAttempt(was_ready, status == STRIDEWIRE_SHUTTING_DOWN, now_s);
   output_.clear();
   pending_pings_.clear();
   inspections_.clear();
   events_.Push(
       MakeEvent(was_ready ? STRIDEWIRE_EVENT_CONNECTION_LOST : STRIDEWIRE_EVENT_CONNECT_FAILED, 0,
                 status, last_text_));
+}
+
+void Session::ScheduleAttempt(bool was_ready, bool server_leaves, double now_s) {
+  const std::size_t count = std::max<std::size_t>(addresses_.size(), 1);
+  if (was_ready && !(server_leaves && count > 1)) {
+    // Only this server can resume the session.
+    failed_attempts_ = 0;
+    next_attempt_s_ = now_s + backoff_.Next();
+    return;
+  }
+  address_ = (address_ + 1) % count;
+  failed_attempts_ = was_ready ? 0 : failed_attempts_ + 1;
+  // After a shutdown, the delay spreads the clients that move to the next server.
+  const bool waits = was_ready || failed_attempts_ >= count;
+  next_attempt_s_ = waits ? now_s + backoff_.Next() : now_s;
+  if (waits) failed_attempts_ = 0;
+}
+
+std::string_view Session::AddressText() const {
+  return address_ < addresses_.size() ? std::string_view(addresses_[address_]) : "";
 }
 
 void Session::CloseWithError(stridewire_status status, std::string_view text) {
@@ -222,7 +245,7 @@ void Session::Reset() {
   output_.clear();
 }
 
-stridewire_status Session::Open(double now_s) {
+stridewire_status Session::Open(double now_s, std::vector<std::string> addresses) {
   switch (state_) {
     case State::kIdle:
     case State::kClosing:
@@ -231,6 +254,9 @@ stridewire_status Session::Open(double now_s) {
   }
   Reset();
   backoff_.Reset();
+  addresses_ = std::move(addresses);
+  address_ = 0;
+  failed_attempts_ = 0;
   last_status_ = STRIDEWIRE_OK;
   last_text_.clear();
   state_ = State::kWaiting;

@@ -27,7 +27,9 @@ class Session : public SessionCommands {
 
   // ---- called by the application
 
-  stridewire_status Open(double now_s);
+  /// Starts to connect. `addresses` contains the texts of the servers' addresses, which the caller
+  /// connects to by their index. An empty list means one address without a text.
+  stridewire_status Open(double now_s, std::vector<std::string> addresses = {});
   void Close(double now_s);
   stridewire_status Ping(double now_s);
 
@@ -36,6 +38,8 @@ class Session : public SessionCommands {
   /// Returns whether to start an attempt to connect, with StartConnecting.
   [[nodiscard]] bool ConnectDue(double now_s) const;
   void StartConnecting(double now_s);
+  /// Returns the index of the address for the attempt that StartConnecting has begun.
+  [[nodiscard]] std::size_t address_index() const { return address_; }
   void OnConnected(double now_s);
   void OnBytes(std::span<const std::byte> bytes, double now_s);
   /// Same as OnBytes for transports that keep frames apart, such as WebSocket. `frame` must be one
@@ -91,6 +95,10 @@ class Session : public SessionCommands {
   void RestoreSession();
   void Reset();
   void LoseConnection(stridewire_status status, std::string_view text, double now_s);
+  /// Chooses the address and the time of the next attempt to connect.
+  void ScheduleAttempt(bool was_ready, bool server_leaves, double now_s);
+  /// Returns the text of the current address; empty if there is none.
+  [[nodiscard]] std::string_view AddressText() const;
   void CloseWithError(stridewire_status status, std::string_view text);
   void SendPing(double now_s);
   void SchedulePing(double now_s);

@@ -63,7 +63,7 @@ void Session::Handle(const protocol::Welcome& message, double now_s) {
           std::min<std::size_t>(limits_.max_control_bytes, protocol::kMaxControlBytes),
       .max_bulk_bytes = std::min<std::size_t>(limits_.max_bulk_bytes, protocol::kMaxBulkBytes)});
 
-  stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_CONNECTED);
+  stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_CONNECTED, 0, STRIDEWIRE_OK, AddressText());
   event.resumed = message.resumed ? 1 : 0;
   events_.Push(event);
   if (message.resumed) {

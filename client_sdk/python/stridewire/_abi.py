@@ -7,6 +7,7 @@ import ctypes as c
 
 MAX_NAME_BYTES = 64
 MAX_TEXT_BYTES = 160
+MAX_ADDRESSES = 16
 MAX_ITEMS = 65536
 MAX_JOINTS = 256
 MAX_TERRAIN_COLUMNS = 1024
@@ -34,6 +35,13 @@ class stridewire_client_options(c.Structure):
         ("auth_token", c.c_char_p),
         ("respawn", c.c_uint8),
         ("library_folder", c.c_char_p),
+    ]
+
+
+class stridewire_address(c.Structure):
+    _fields_ = [
+        ("host", c.c_char_p),
+        ("port", c.c_uint16),
     ]
 
 
@@ -315,6 +323,8 @@ FUNCTIONS = {
         c.POINTER(c.c_void_p)]),
     "stridewire_client_destroy": (None, [c.c_void_p]),
     "stridewire_client_connect": (c.c_int, [c.c_void_p, c.c_char_p, c.c_uint16]),
+    "stridewire_client_connect_any": (c.c_int, [c.c_void_p, c.POINTER(stridewire_address),
+        c.c_size_t]),
     "stridewire_client_disconnect": (c.c_int, [c.c_void_p]),
     "stridewire_client_get_state": (c.c_int, [c.c_void_p]),
     "stridewire_client_last_error": (c.c_int, [c.c_void_p, c.c_char_p, c.c_size_t]),

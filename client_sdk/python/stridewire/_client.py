@@ -45,6 +45,13 @@ def _point(position_m: Vec3) -> tuple[float, ...]:
     return point
 
 
+def _address(text: str) -> _abi.stridewire_address:
+    host, colon, port = text.rpartition(":")
+    if not colon or not port.isdecimal() or int(port) > 65535:
+        raise ValueError(f"address: expected HOST:PORT, got {text!r}")
+    return _abi.stridewire_address(host.strip("[]").encode(), int(port))
+
+
 def _ids(avatars: Iterable[int]) -> Any:
     ids = list(avatars)
     return (c.c_uint32 * len(ids))(*ids)
@@ -70,6 +77,9 @@ class Client:
         with stridewire.Client("127.0.0.1:7420") as client:
             world = client.join("plaza")
 
+    `address` is HOST:PORT, or a list of up to 16 servers that offer the same worlds. The client
+    tries them in order, and again when it has lost the connection.
+
     `timeout_s` limits every call that waits for the server. A client is not thread-safe.
     """
 
@@ -77,12 +87,12 @@ class Client:
     #: more, the oldest are dropped.
     MAX_EVENTS = 65536
 
-    def __init__(self, address: str, *, name: str = "stridewire-python", token: str = "",
-                 timeout_s: float = 10.0, render_delay_s: float = 0.1, pose_history: int = 256,
-                 respawn: bool = False, library_folder: str | None = None) -> None:
-        host, colon, port = address.rpartition(":")
-        if not colon or not port.isdecimal() or int(port) > 65535:
-            raise ValueError(f"address: expected HOST:PORT, got {address!r}")
+    def __init__(self, address: str | Sequence[str], *, name: str = "stridewire-python",
+                 token: str = "", timeout_s: float = 10.0, render_delay_s: float = 0.1,
+                 pose_history: int = 256, respawn: bool = False,
+                 library_folder: str | None = None) -> None:
+        texts = [address] if isinstance(address, str) else list(address)
+        addresses = (_abi.stridewire_address * len(texts))(*map(_address, texts))
         self.timeout_s = timeout_s
         self._handle = c.c_void_p()
         self._events: collections.deque[Event] = collections.deque(maxlen=self.MAX_EVENTS)
@@ -102,8 +112,8 @@ class Client:
         options.library_folder = library_folder.encode() if library_folder else None
         _check(_library.stridewire_client_create(c.byref(options), c.byref(self._handle)))
         try:
-            _check(_library.stridewire_client_connect(self._handle, host.strip("[]").encode(),
-                                                      int(port)))
+            _check(_library.stridewire_client_connect_any(self._handle, addresses,
+                                                          len(addresses)))
             self._wait(lambda event: event.type in (EventType.CONNECTED, EventType.CLOSED),
                        "the server did not answer")
         except BaseException:

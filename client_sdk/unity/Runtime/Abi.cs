@@ -134,7 +134,8 @@ namespace Stridewire
     /// <summary>stridewire_event_type of the C API.</summary>
     public enum EventType
     {
-        /// <summary>Uses resumed. The handshake is complete.</summary>
+        /// <summary>Uses resumed, and text: the address of the server. The handshake is
+        /// complete.</summary>
         Connected = 0,
         /// <summary>Uses status, text. The client tries again.</summary>
         ConnectFailed = 1,
@@ -251,6 +252,13 @@ namespace Stridewire
         public byte* auth_token;
         public byte respawn;
         public byte* library_folder;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal unsafe struct stridewire_address
+    {
+        public byte* host;
+        public ushort port;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -529,6 +537,7 @@ namespace Stridewire
 
         public const int MaxNameBytes = 64;
         public const int MaxTextBytes = 160;
+        public const int MaxAddresses = 16;
         public const int MaxItems = 65536;
         public const int MaxJoints = 256;
         public const int MaxTerrainColumns = 1024;
@@ -568,6 +577,12 @@ namespace Stridewire
             IntPtr client,
             byte* host,
             ushort port);
+
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern Status stridewire_client_connect_any(
+            IntPtr client,
+            stridewire_address* addresses,
+            UIntPtr count);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_disconnect(
@@ -769,6 +784,7 @@ namespace Stridewire
         public static string FindWrongLayout()
         {
             if (sizeof(stridewire_client_options) != 104) return "stridewire_client_options";
+            if (sizeof(stridewire_address) != 16) return "stridewire_address";
             if (sizeof(stridewire_spawn) != 40) return "stridewire_spawn";
             if (sizeof(stridewire_movement) != 144) return "stridewire_movement";
             if (sizeof(stridewire_height_field) != 40) return "stridewire_height_field";

@@ -38,6 +38,15 @@ namespace Stridewire
         public string LibraryFolder;
     }
 
+    /// <summary>Address of a server.</summary>
+    public struct ServerAddress
+    {
+        /// <summary>Name or IP address.</summary>
+        public string Host;
+
+        public int Port;
+    }
+
     /// <summary>A connection to a server. The client connects, and reconnects, in the background.
     /// No method waits for the server, apart from WaitEvent: commands are queued, and events report
     /// their results. Methods that fail throw StridewireException. Use a client, its worlds and
@@ -136,9 +145,35 @@ namespace Stridewire
         /// <summary>Starts to connect. EventType.Connected reports success.</summary>
         public void Connect(string host, int port)
         {
-            fixed (byte* text = Utf8(host))
+            Connect(new ServerAddress { Host = host, Port = port });
+        }
+
+        /// <summary>Starts to connect to one of up to 16 servers that offer the same worlds. The
+        /// client tries them in order, and again when it has lost the connection.</summary>
+        public void Connect(params ServerAddress[] servers)
+        {
+            var hosts = new GCHandle[servers.Length];
+            var native = new stridewire_address[servers.Length];
+            try
             {
-                Check(Abi.stridewire_client_connect(Handle, text, checked((ushort)port)));
+                for (int i = 0; i < servers.Length; ++i)
+                {
+                    hosts[i] = GCHandle.Alloc(Utf8(servers[i].Host), GCHandleType.Pinned);
+                    native[i].host = (byte*)hosts[i].AddrOfPinnedObject();
+                    native[i].port = checked((ushort)servers[i].Port);
+                }
+                fixed (stridewire_address* first = native)
+                {
+                    Check(Abi.stridewire_client_connect_any(
+                        Handle, first, (UIntPtr)native.Length));
+                }
+            }
+            finally
+            {
+                foreach (GCHandle host in hosts)
+                {
+                    if (host.IsAllocated) host.Free();
+                }
             }
         }
 

@@ -79,9 +79,11 @@ class Daemon {
 class User {
  public:
   explicit User(std::uint16_t port, stridewire_role role = STRIDEWIRE_CONTROLLER,
-                const Options& options = {})
+                const Options& options = {},
+                const std::vector<std::pair<std::string, std::uint16_t>>& addresses = {})
       : client(Client::Create(options).value()) {
-    EXPECT_TRUE(client.Connect("127.0.0.1", port));
+    EXPECT_TRUE(addresses.empty() ? client.Connect("127.0.0.1", port)
+                                  : client.ConnectAny(addresses));
     EXPECT_TRUE(client.JoinWorld("plaza", role, world));
   }
 
@@ -437,6 +439,40 @@ TEST(ClientAndServer, ReconnectsAfterTheServerWasRestarted) {
   server.emplace(port);
   ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_SESSION_LOST));
   EXPECT_TRUE(user.Next(STRIDEWIRE_EVENT_WORLD_JOINED));
+}
+
+TEST(ClientAndServer, MovesToAnotherServer) {
+  std::optional<Daemon> first(std::in_place);
+  std::optional<Daemon> second(std::in_place);
+  const std::uint16_t port = first->port();
+  ASSERT_NE(port, 0);
+  ASSERT_NE(second->port(), 0);
+  Options options;
+  options.respawn = 1;
+  User user(port, STRIDEWIRE_CONTROLLER, options,
+            {{"127.0.0.1", port}, {"localhost", second->port()}});
+  const auto connected = user.Next(STRIDEWIRE_EVENT_CONNECTED);
+  ASSERT_TRUE(connected);
+  EXPECT_EQ(connected->text, first->address());
+  user.Spawn(1);
+  const auto is_there = [&](const Daemon& server, const std::string& host) {
+    const auto moved = user.Next(STRIDEWIRE_EVENT_CONNECTED);
+    const auto spawned = user.Next(STRIDEWIRE_EVENT_SPAWNED);
+    return moved && spawned && moved->text == host + ":" + std::to_string(server.port());
+  };
+
+  EXPECT_EQ(first->Terminate(), 0);  // A planned move.
+  const auto left = user.Next(STRIDEWIRE_EVENT_CONNECTION_LOST);
+  ASSERT_TRUE(left);
+  EXPECT_EQ(left->status, STRIDEWIRE_SHUTTING_DOWN);
+  EXPECT_TRUE(is_there(*second, "localhost"));
+  EXPECT_EQ(user.client.Statistics().connect_failures, 0u);
+
+  first.reset();
+  first.emplace(port);
+  second->KillHard();
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_CONNECTION_LOST));
+  EXPECT_TRUE(is_there(*first, "127.0.0.1"));
 }
 
 // ---- stridewire-record

@@ -237,7 +237,11 @@ class Live(unittest.TestCase):
         with self.assertRaises(StridewireError) as caught:
             stridewire.Client("127.0.0.1:1", timeout_s=0.5)
         self.assertEqual(caught.exception.status, "timeout")
-        client = stridewire.Client(self.address)
+        # The second of two servers answers.
+        client = stridewire.Client(["127.0.0.1:1", self.address])
+        connected = [event for event in client.poll_events()
+                     if event.type == stridewire.EventType.CONNECTED]
+        self.assertEqual([event.text for event in connected], [self.address])
         client.close()
         with self.assertRaises(StridewireError):
             client.poll_events()

@@ -301,6 +301,17 @@ static class ClientTest
         }
         using (var client = new Client())
         {
+            client.Connect(new ServerAddress { Host = "127.0.0.1", Port = 1 },
+                           new ServerAddress { Host = "localhost", Port = port });
+            Stridewire.Event failed =
+                Wait(client, "failure", e => e.Type == EventType.ConnectFailed);
+            Require(failed.Text.StartsWith("127.0.0.1:1: "), "the text contains the address");
+            Stridewire.Event connected =
+                Wait(client, "second server", e => e.Type == EventType.Connected);
+            RequireEqual(connected.Text, "localhost:" + port, "second server");
+        }
+        using (var client = new Client())
+        {
             client.Connect("127.0.0.1", 1);
             Stridewire.Event failed =
                 Wait(client, "failure", e => e.Type == EventType.ConnectFailed);

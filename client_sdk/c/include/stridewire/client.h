@@ -28,7 +28,8 @@
 /// Connection. The client connects, and reconnects, in the background. The first retry follows a
 /// failure after 0.1 s. The delay doubles with each failure, up to 5 s, and is shortened by a
 /// random amount of up to half. The client retries until it is disconnected or the server refuses
-/// it permanently. Commands are queued while there is no connection. After a reconnect:
+/// it permanently. Commands are queued while there is no connection. If there are several servers,
+/// see stridewire_client_connect_any. After a reconnect:
 ///   - If the server still has the session, it resumes (STRIDEWIRE_EVENT_CONNECTED with `resumed`).
 ///     The client sends unanswered commands again, and the server executes each of them once.
 ///   - Otherwise the session is lost (STRIDEWIRE_EVENT_SESSION_LOST), for example because the
@@ -119,6 +120,21 @@ void stridewire_client_destroy(stridewire_client* client);
 /// called.
 stridewire_status stridewire_client_connect(stridewire_client* client, const char* host,
                                             uint16_t port);
+
+/// Address of a server.
+typedef struct stridewire_address {
+  const char* host;  ///< Name or IP address of at most 255 bytes.
+  uint16_t port;     ///< Not 0.
+} stridewire_address;
+
+/// Same as stridewire_client_connect, with the addresses of `count` servers that offer the same
+/// worlds, 1 to STRIDEWIRE_MAX_ADDRESSES. The client tries them in order, and waits between
+/// attempts only after all of them have failed. After a lost connection it first tries the same
+/// address again, because only that server can resume the session. After a server has announced
+/// its shutdown, it begins with the next address. If there are several addresses, the texts of
+/// CONNECT_FAILED and CONNECTION_LOST begin with the address.
+stridewire_status stridewire_client_connect_any(stridewire_client* client,
+                                                const stridewire_address* addresses, size_t count);
 
 /// Ends the session and returns at once. The server removes the avatars that this session spawned,
 /// except in persistent worlds. Unanswered commands end with STRIDEWIRE_CANCELLED. The client
@@ -436,7 +452,8 @@ stridewire_status stridewire_client_ping(stridewire_client* client);
 /// Type of an event. The comments list the fields of stridewire_event that the type uses.
 typedef enum stridewire_event_type {
   // Events about the connection.
-  STRIDEWIRE_EVENT_CONNECTED = 0,        ///< Uses resumed. The handshake is complete.
+  /// Uses resumed, and text: the address of the server. The handshake is complete.
+  STRIDEWIRE_EVENT_CONNECTED = 0,
   STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< Uses status, text. The client tries again.
   STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< Uses status, text. The client reconnects.
   STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server has no session of this client any more.

@@ -191,6 +191,12 @@ class Client {
   Result Connect(const std::string& host, std::uint16_t port) {
     return stridewire_client_connect(handle_, host.c_str(), port);
   }
+  /// `addresses` contains the host and port of each server.
+  Result ConnectAny(const std::vector<std::pair<std::string, std::uint16_t>>& addresses) {
+    std::vector<stridewire_address> list;
+    for (const auto& [host, port] : addresses) list.push_back({host.c_str(), port});
+    return stridewire_client_connect_any(handle_, list.data(), list.size());
+  }
   Result Disconnect() { return stridewire_client_disconnect(handle_); }
   stridewire_client_state state() const { return stridewire_client_get_state(handle_); }
   bool ready() const { return state() == STRIDEWIRE_STATE_READY; }
