@@ -71,9 +71,10 @@ int Run(int argc, char** argv) {
       "  stridewire-record --connect 127.0.0.1:7420 --world plaza --avatar 1 --seconds 10 "
       "--out walk.bvh\n"
       "Exit code: 0 success; 2 invalid options; 1 any other error. If the recording ends early, "
-      "the "
-      "file\n"
-      "contains the frames up to then.\n");
+      "the\n"
+      "file contains the frames up to then. If the server restarts, the recording continues when "
+      "the\n"
+      "avatar is back within --timeout-s, and the frames between repeat the last pose.\n");
 
   Options options;
   std::string address;
@@ -151,6 +152,10 @@ int Run(int argc, char** argv) {
   if (json) {
     nlohmann::ordered_json gaps = nlohmann::ordered_json::array();
     for (const Gap& gap : recording->gaps) gaps.push_back({gap.first_frame, gap.frames});
+    nlohmann::ordered_json restarts = nlohmann::ordered_json::array();
+    for (const Restart& restart : recording->restarts) {
+      restarts.push_back({{"frame", restart.frame}, {"away_s", restart.away_s}});
+    }
     const nlohmann::ordered_json report = {
         {"world", options.world},
         {"avatar", options.avatar},
@@ -165,6 +170,7 @@ int Run(int argc, char** argv) {
         {"ticks_missing", recording->ticks_missing},
         {"gaps", gaps},
         {"discontinuities", recording->discontinuities},
+        {"restarts", restarts},
         {"bytes_received", recording->bytes_received},
         {"cut_short", recording->cut_short.empty() ? nlohmann::ordered_json()
                                                    : nlohmann::ordered_json(recording->cut_short)}};
@@ -177,6 +183,12 @@ int Run(int argc, char** argv) {
     if (recording->ticks_missing > 0) {
       std::printf("%llu ticks did not arrive and were interpolated from their neighbours\n",
                   static_cast<unsigned long long>(recording->ticks_missing));
+    }
+  }
+  if (!json) {
+    for (const Restart& restart : recording->restarts) {
+      std::printf("the server restarted before frame %d; no poses arrived for %.1f s\n",
+                  restart.frame, restart.away_s);
     }
   }
   if (!recording->cut_short.empty()) {

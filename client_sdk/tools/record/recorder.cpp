@@ -98,10 +98,8 @@ class Recorder {
         case STRIDEWIRE_EVENT_REPLY:
           if (event.status != STRIDEWIRE_OK) return End("the server refused: " + text);
           break;
-        case STRIDEWIRE_EVENT_SESSION_LOST:
-          // Ticks and avatars of a new session are unrelated to those of the recording.
-          if (frame_count() > 0) return End("the session was lost");
-          break;
+        // Ticks of a new session are unrelated to those of the recording.
+        case STRIDEWIRE_EVENT_SESSION_LOST: is_new_session_ = frame_count() > 0; break;
         default: break;
       }
     }
@@ -146,12 +144,22 @@ class Recorder {
 
   Status TakePoses() {
     for (;;) {
+      if (is_new_session_) last_tick_ = UINT64_MAX;
       if (!client_.NextPose(world_, options_.avatar, last_tick_, pose_) || pose_.missing()) break;
+      if (!is_new_session_) {
+        // The client reports a new session before its first pose.
+        if (Status status = HandleEvents(); !status) return status;
+        if (!recording_.cut_short.empty()) break;
+        if (is_new_session_) continue;
+      }
       if (frame_count() == 0) {
         if (Status status = Describe(); !status) return status;
         recording_.first_tick = pose_.tick;
+      } else if (is_new_session_) {
+        if (Status status = OnRestart(); !status) return status;
+        if (!recording_.cut_short.empty()) break;
       } else {
-        Fill();
+        Fill(pose_.tick - last_tick_);
       }
       if (frame_count() < target_frames_) Append();
       last_tick_ = pose_.tick;
@@ -172,11 +180,27 @@ class Recorder {
       clip.rotations.emplace_back(q.w, q.x, q.y, q.z);
   }
 
-  /// Adds frames for the ticks between the last pose and this one. They are interpolated linearly,
-  /// or repeat the last pose before a discontinuity.
-  void Fill() {
+  /// Continues the recording with the first pose of a new session.
+  Status OnRestart() {
+    is_new_session_ = false;
+    client::Skeleton skeleton;
+    if (!client_.GetSkeleton(world_, skeleton)) {
+      return Fail(ErrorCode::kIo, "the server did not send the skeleton", Where());
+    }
+    if (skeleton.library_hash != recording_.library_hash || skeleton.tick_hz != hz_) {
+      return End("the restarted server has another library or tick rate");
+    }
+    const double away_s = std::chrono::duration<double>(Clock::now() - received_).count();
+    pose_.discontinuity = 1;
+    Fill(static_cast<std::uint64_t>(std::max(1.0, std::round(away_s * hz_))));
+    recording_.restarts.push_back({frame_count(), away_s});
+    return {};
+  }
+
+  /// Adds frames for the time between the last pose and this one, which is `ticks` later. They are
+  /// interpolated linearly, or repeat the last pose before a discontinuity.
+  void Fill(std::uint64_t ticks) {
     Clip& clip = recording_.clip;
-    const std::uint64_t ticks = pose_.tick - last_tick_;
     const int from = frame_count() - 1;
     const std::uint64_t filled =
         std::min(ticks - 1, static_cast<std::uint64_t>(target_frames_ - frame_count()));
@@ -206,6 +230,7 @@ class Recorder {
   client::Client client_;
   stridewire_world world_ = 0;
   bool was_ready_ = false;
+  bool is_new_session_ = false;  ///< True from a lost session to the next pose.
   bool done_ = false;
   double hz_ = 60.0;
   int target_frames_ = 1;

@@ -33,6 +33,12 @@ struct Gap {
   int frames = 0;
 };
 
+/// A restart of the server during a recording.
+struct Restart {
+  int frame = 0;      ///< First frame after the restart.
+  double away_s = 0;  ///< Time without poses, measured by the clock of this machine.
+};
+
 /// A recorded motion.
 struct Recording {
   Skeleton skeleton;
@@ -44,6 +50,9 @@ struct Recording {
   /// Runs of missing frames; at most kMaxGaps of them are listed.
   std::vector<Gap> gaps;
   std::uint64_t discontinuities = 0;
+  /// Restarts of the server. Ticks of the new server are unrelated to those before, so the gap has
+  /// as many frames as the time without poses has ticks. They repeat the last pose.
+  std::vector<Restart> restarts;
   std::uint64_t bytes_received = 0;
   std::string cut_short;  ///< Reason why the recording is too short. Empty: it is complete.
 };
@@ -51,7 +60,8 @@ struct Recording {
 inline constexpr std::size_t kMaxGaps = 1000;
 
 /// Records one avatar for `seconds` of server time, counted in ticks from the first received pose.
-/// Waits for nothing longer than `timeout_s`. Calls `progress`, unless it is empty, with the number
+/// If the server restarts, the recording continues when the avatar is back. Waits for nothing
+/// longer than `timeout_s`. Calls `progress`, unless it is empty, with the number
 /// of recorded seconds. Fails with kIo if there is no connection or no such avatar.
 [[nodiscard]] Expected<Recording> Record(const Options& options,
                                          const std::function<void(double)>& progress);

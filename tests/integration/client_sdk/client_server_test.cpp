@@ -556,6 +556,46 @@ TEST(Record, InterpolatesMissingPoses) {
   EXPECT_EQ(capture->clip.frame_count(), 360);
 }
 
+TEST(Record, ContinuesAfterTheServerWasKilled) {
+  std::optional<Daemon> server(std::in_place);
+  const std::uint16_t port = server->port();
+  ASSERT_NE(port, 0);
+  const ScratchFolder folder;
+  Options options;
+  options.respawn = 1;
+  User user(port, STRIDEWIRE_CONTROLLER, options);
+  user.Spawn(1);
+  auto arguments = RecordArguments(server->address(), folder.File("restart.bvh"));
+  arguments[7] = "10";
+  arguments.push_back("--json");
+  ChildProcess record(STRIDEWIRE_RECORD, arguments);
+  std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+  server->KillHard();
+  server.reset();
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  server.emplace(port);
+  const auto line = record.ReadLineThatBegins("{", 120.0);
+  ASSERT_TRUE(line);
+  EXPECT_EQ(record.Wait(), 0);
+  const json report = json::parse(*line);
+  EXPECT_TRUE(report["cut_short"].is_null());
+  EXPECT_EQ(report["frames"], 600);
+  ASSERT_EQ(report["restarts"].size(), 1u);
+  const double away_s = report["restarts"][0]["away_s"];
+  EXPECT_GE(away_s, 0.5);
+  // The gap ends at the first pose of the new server.
+  const int frame = report["restarts"][0]["frame"];
+  const int frames = static_cast<int>(std::round(60.0 * away_s)) - 1;
+  EXPECT_THAT(report["gaps"], testing::Contains(json({frame - frames, frames})));
+  const auto capture = ReadBvh(folder.File("restart.bvh"), {});
+  ASSERT_TRUE(capture) << Describe(capture.error());
+  ASSERT_EQ(capture->clip.frame_count(), 600);
+  // The frames of the gap repeat the last pose.
+  const auto root = [&](int f) { return capture->clip.frame(f).root_position_m; };
+  EXPECT_EQ(root(frame - frames - 1), root(frame - 1));
+  EXPECT_NE(root(frame - 1), root(frame));
+}
+
 TEST(Record, WritesAPartialFileIfTheServerStops) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
