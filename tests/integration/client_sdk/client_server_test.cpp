@@ -7,7 +7,10 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -473,6 +476,148 @@ TEST(ClientAndServer, MovesToAnotherServer) {
   second->KillHard();
   ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_CONNECTION_LOST));
   EXPECT_TRUE(is_there(*first, "127.0.0.1"));
+}
+
+/// Lets an avatar walk and checks what a client of a server that is killed again and again must not
+/// do: lose or repeat a reply, end a request twice, or display a jump without a new segment.
+class RestartObserver {
+ public:
+  explicit RestartObserver(User& user) : user_(user) {}
+
+  /// Polls events, samples the avatar and keeps it walking until `done` returns true for an event.
+  bool Until(const std::function<bool(const stridewire_event&)>& done) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatienceS);
+    while (std::chrono::steady_clock::now() < until) {
+      bool is_done = false;
+      stridewire_event event;
+      while (user_.client.PollEvent(event)) {
+        Count(event);
+        is_done = is_done || done(event);
+      }
+      Sample();
+      if (is_done) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(8));
+    }
+    return false;
+  }
+
+  void Request() {
+    std::uint64_t command = 0;
+    const std::uint64_t id = ++last_request_;
+    EXPECT_TRUE(user_.client.Request(user_.world, {client::Step(1, id, 0.6)}, &command));
+    replies_.emplace(command, 0);
+    ends_.emplace(id, 0);
+  }
+
+  /// Checks the numbers of replies and ends. Call it after all replies have arrived.
+  void Check() {
+    for (const auto& [command, count] : replies_) EXPECT_EQ(count, 1) << "command " << command;
+    for (const auto& [id, count] : ends_) EXPECT_LE(count, 1) << "request " << id;
+  }
+
+  [[nodiscard]] bool IsAnswered() const {
+    return std::ranges::all_of(replies_, [](const auto& entry) { return entry.second > 0; });
+  }
+
+  void Print(int restarts) const {
+    std::printf(
+        "%d restarts: %zu requests, %d ended, %d lost with their session; %d samples in %d "
+        "segments, fastest motion within a segment %.2f m/s\n",
+        restarts, replies_.size(), ended_, lost_, samples_, segments_, fastest_m_s_);
+  }
+
+ private:
+  void Count(const stridewire_event& event) {
+    if (event.type == STRIDEWIRE_EVENT_REPLY) {
+      if (const auto found = replies_.find(event.command); found != replies_.end()) {
+        ++found->second;
+        EXPECT_TRUE(event.status == STRIDEWIRE_OK || event.status == STRIDEWIRE_SESSION_LOST)
+            << event.text;
+        if (event.status == STRIDEWIRE_SESSION_LOST) ++lost_;
+      }
+    }
+    if (event.outcome != STRIDEWIRE_OUTCOME_NONE) {
+      ++ends_[event.request_id];
+      ++ended_;
+    }
+  }
+
+  void Sample() {
+    const auto time_s = user_.client.RenderTime();
+    if (!time_s || !user_.client.SamplePose(user_.world, 1, *time_s, pose_) || pose_.missing()) {
+      return;
+    }
+    ++samples_;
+    if (has_last_ && pose_.segment == last_.segment) {
+      const double elapsed_s = pose_.time_s - last_.time_s;
+      const double moved_m = std::hypot(pose_.root_position_m[0] - last_.root_position_m[0],
+                                        pose_.root_position_m[2] - last_.root_position_m[2]);
+      EXPECT_GE(elapsed_s, 0.0);
+      EXPECT_LE(moved_m, kFastestMPerS * elapsed_s + 1e-3);
+      if (elapsed_s > 0.005) fastest_m_s_ = std::max(fastest_m_s_, moved_m / elapsed_s);
+    } else {
+      ++segments_;
+    }
+    last_ = pose_;
+    has_last_ = true;
+  }
+
+  static constexpr double kFastestMPerS = 3.0;
+
+  User& user_;
+  std::map<std::uint64_t, int> replies_;  // Number of replies to each command.
+  std::map<std::uint64_t, int> ends_;     // Number of ends of each request.
+  std::uint64_t last_request_ = 0;
+  client::Pose pose_;
+  client::Pose last_;
+  bool has_last_ = false;
+  double fastest_m_s_ = 0.0;
+  int ended_ = 0;
+  int lost_ = 0;
+  int samples_ = 0;
+  int segments_ = 0;
+};
+
+TEST(ClientAndServer, SurvivesManyRestarts) {
+  const char* count = std::getenv("STRIDEWIRE_RESTARTS");
+  const int restarts = count != nullptr ? std::atoi(count) : 3;
+  std::optional<Daemon> server(std::in_place);
+  const std::uint16_t port = server->port();
+  ASSERT_NE(port, 0);
+  Options options;
+  options.respawn = 1;
+  User user(port, STRIDEWIRE_CONTROLLER, options);
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Observe(user.world));
+  RestartObserver observer(user);
+  const auto step_has_ended = [&](const stridewire_event& event) {
+    return event.type == STRIDEWIRE_EVENT_FINISHED && event.request_id != 0;
+  };
+  for (int i = 0; i < restarts; ++i) {
+    observer.Request();
+    observer.Request();
+    ASSERT_TRUE(observer.Until(step_has_ended)) << i;
+    // These requests may be lost with the session, which their replies report.
+    observer.Request();
+    server->KillHard();
+    server.reset();
+    observer.Request();
+    server.emplace(port);
+    ASSERT_EQ(server->port(), port);
+    ASSERT_TRUE(observer.Until([](const stridewire_event& event) {
+      return event.type == STRIDEWIRE_EVENT_SESSION_LOST;
+    })) << i;
+    observer.Request();
+    ASSERT_TRUE(observer.Until(step_has_ended)) << i;
+  }
+  const auto idle = [](const stridewire_event& event) {
+    return event.type == STRIDEWIRE_EVENT_IDLE;
+  };
+  ASSERT_TRUE(observer.Until(idle));
+  EXPECT_TRUE(observer.IsAnswered());
+  observer.Check();
+  observer.Print(restarts);
+  EXPECT_EQ(user.client.Statistics().connects, static_cast<std::uint64_t>(restarts) + 1);
 }
 
 // ---- stridewire-record
