@@ -14,18 +14,25 @@ namespace {
 // of blend and movement together is 4 to 4.6 m/s2.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
 constexpr double kMaxApproachS = 0.8;
+// Vertical accelerations count less, because climbing legs push the body up.
+constexpr double kVerticalWeight = 0.4;
 // On terrain the blend is shorter, because a leg that climbs or descends reaches less far.
 constexpr double kMaxTerrainApproachS = 0.35;
 constexpr double kApproachStepS = 0.02;
 
 double HorizontalLength(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 
+// Returns the length of an acceleration, in which a vertical part counts less.
+double WeightedLength(const DVec3& v) {
+  return std::max(HorizontalLength(v), kVerticalWeight * std::fabs(v.y));
+}
+
 // Returns the largest acceleration of the cubic curve that begins at `offset_m` with velocity
 // `offset_m_s` and comes to rest at 0 after `over_s`.
 double PeakAcceleration(const DVec3& offset_m, const DVec3& offset_m_s, double over_s) {
   const DVec3 bend = 6.0 / (over_s * over_s) * offset_m;
   const DVec3 slope = 2.0 / over_s * offset_m_s;
-  return std::max(HorizontalLength(bend + 2.0 * slope), HorizontalLength(bend + slope));
+  return std::max(WeightedLength(bend + 2.0 * slope), WeightedLength(bend + slope));
 }
 
 // Returns the shortest time from `least_s` to `most_s` in which the root can go from `offset_m`
@@ -56,22 +63,32 @@ void PlanRootApproach(const FootPlanJob& job) {
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       root -= plan.foot(foot).root_weight * sampler.Ball(i, foot);
     }
-    return DVec3(root.x, 0.0, root.z);
+    return root;
   };
-  const DVec3 offset_m = above_feet(0) - above_feet(2);
+  // On terrain, the root also approaches its height if it rises. The legs of an avatar that has
+  // climbed would otherwise straighten while the difference pose fades out.
+  const bool rises = plan.keeps_above_ground && above_feet(0).y < above_feet(2).y;
+  const auto offset_at = [&](std::size_t i) {
+    DVec3 offset = above_feet(i) - above_feet(i + 2);
+    if (!rises) offset.y = 0.0;
+    return offset;
+  };
+  const DVec3 offset_m = offset_at(0);
   DVec3 offset_m_s(0.0);
   if (movement.is_inertial) {
-    const DVec3 next_m = above_feet(1) - above_feet(3);
+    const DVec3 next_m = offset_at(1);
     const double eased = step_s / ease_out_s;
     offset_m_s = (next_m - EaseOut(eased) * offset_m) / (ease_out_s * EaseOutSlope(eased));
   }
   const double most_s = std::min(plan.keeps_above_ground ? kMaxTerrainApproachS : kMaxApproachS,
                                  movement.duration_s() - start_s);
-  plan.root_approach = {
-      .offset_m = offset_m,
-      .offset_m_s = offset_m_s,
-      .over_s = ApproachTime(offset_m + plan.root_residual_m, offset_m_s + plan.root_residual_m_s,
-                             ease_out_s, std::max(ease_out_s, most_s))};
+  DVec3 residual_m = plan.root_residual_m;
+  DVec3 residual_m_s = plan.root_residual_m_s;
+  residual_m.y = residual_m_s.y = 0.0;  // Fades over kRootRisePart of the movement.
+  plan.root_approach = {.offset_m = offset_m,
+                        .offset_m_s = offset_m_s,
+                        .over_s = ApproachTime(offset_m + residual_m, offset_m_s + residual_m_s,
+                                               ease_out_s, std::max(ease_out_s, most_s))};
 }
 
 }  // namespace stridewire
