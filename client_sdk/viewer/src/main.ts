@@ -12,12 +12,19 @@ if (!info) {
 } else {
   // ?server=host:port connects to a server other than the one that served this page.
   const server = new URLSearchParams(location.search).get('server');
-  const app = new App(root, info, {
-    // The folder of this page, which may be below a path prefix of a proxy.
-    host: server && /^[\w.\-[\]:]+$/.test(server) ? server :
-      location.host + location.pathname.replace(/\/[^/]*$/, ''),
-    secure: location.protocol === 'https:',
-  });
+  let app: App;
+  try {
+    app = new App(root, info, {
+      // The folder of this page, which may be below a path prefix of a proxy.
+      host: server && /^[\w.\-[\]:]+$/.test(server) ? server :
+        location.host + location.pathname.replace(/\/[^/]*$/, ''),
+      secure: location.protocol === 'https:',
+    });
+  } catch (error) {
+    root.replaceChildren(h('p', {class: 'fatal'},
+      `This page cannot start: ${error instanceof Error ? error.message : String(error)}`));
+    throw error;
+  }
   app.start();
   Object.assign(window, {
     stridewire: {

@@ -34,7 +34,7 @@ export interface WebSocketLike {
 
 /**
  * Keeps the files of motion libraries, so that the client need not fetch them again. The client
- * checks the hash of each file. If a promise rejects, or `load` takes longer than 2 s, the client
+ * checks the hash of each file. If a promise rejects, or `load` takes longer than 5 s, the client
  * continues without the cache.
  */
 export interface LibraryCache {

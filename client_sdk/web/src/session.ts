@@ -19,7 +19,7 @@ import {writeMessage} from './wire/write';
 import {WorldHandle} from './world';
 
 const inspectTimeoutS = 10;
-const cacheTimeoutMs = 2000;
+const cacheTimeoutS = 5;
 
 /** States and events of the module, in the order of their numbers. */
 const states: readonly ClientState[] =
@@ -480,7 +480,13 @@ export class Session {
       const hash = native().text;
       if (request === 1) {
         // The promises below also handle exceptions of the cache.
-        const timer = setTimeout(() => this.onLibrary(hash, null), cacheTimeoutMs);
+        // Several timers, because a cache cannot answer while a page is busy.
+        let timer: ReturnType<typeof setTimeout>;
+        const wait = (seconds: number): void => {
+          if (seconds === 0) this.onLibrary(hash, null);
+          else timer = setTimeout(() => wait(seconds - 1), 1000);
+        };
+        wait(cacheTimeoutS);
         const finish = (file: Uint8Array | null): void => {
           clearTimeout(timer);
           this.onLibrary(hash, file);

@@ -137,6 +137,32 @@ test('the installed package runs', () => {
   assert.match(output, /^spawn cancelled$/m);
 });
 
+test('the installed package runs in a worker', () => {
+  writeFileSync(join(project, 'worker.mjs'), `
+      import {Worker, isMainThread} from 'node:worker_threads';
+      if (isMainThread) new Worker(new URL(import.meta.url));
+      else await import('./out/main.js');`);
+  compile(['main.ts'], {module: 'nodenext', lib: ['es2022'], types: ['node']});
+  assert.match(run(process.execPath, ['worker.mjs']), /^error The connection failed\.$/m);
+});
+
+test('creating a client fails with a reason where WebAssembly or SIMD is missing', () => {
+  for (const [missing, reason] of [
+    ['globalThis.WebAssembly = undefined', 'no WebAssembly, which'],
+    ['WebAssembly.validate = () => false', 'no WebAssembly SIMD, which .* Node.js 18 or newer'],
+  ]) {
+    writeFileSync(join(project, 'missing.mjs'), `
+        ${missing};
+        const {Client} = await import('@stridewire/client');
+        try {
+          new Client({url: 'ws://127.0.0.1:7421/stream', webSocket: class {}});
+        } catch (error) {
+          console.log(error.message);
+        }`);
+    assert.match(run(process.execPath, ['missing.mjs']), new RegExp(reason!));
+  }
+});
+
 const skip = programs === undefined && 'set STRIDEWIRE_BIN to a folder of built programs';
 
 test('the quick start of README.md walks and prints poses', {skip}, async () => {
