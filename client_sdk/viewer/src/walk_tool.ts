@@ -27,11 +27,6 @@ interface Walk extends Goal {
   readonly pane: WorldPane;
   readonly avatar: number;
   readonly requestId: bigint;
-  /** True if the server has accepted the request. */
-  accepted: boolean;
-  polledMs: number;
-  /** Number of polls in a row that did not find the walk in the queue. */
-  missedPolls: number;
 }
 
 const maxWaypoints = 64;
@@ -43,13 +38,6 @@ const dragPx = 8;
 const longPressMs = 600;
 /** If the goal is closer than this, the avatar keeps its heading. */
 const minHeadingDistanceM = 0.5;
-/**
- * Interval at which the page checks that a walk is still queued, because another client may have
- * cancelled it.
- */
-const pollIntervalMs = 500;
-/** An inspection reply may overtake events, so one missed poll does not prove that a walk ended. */
-const maxMissedPolls = 3;
 
 export class WalkTool {
   /** True if clicks on the ground request walks. */
@@ -168,9 +156,7 @@ export class WalkTool {
     const waypointsM =
       pending?.pane === pane && pending.avatar === avatar ? pending.waypointsM : [];
     const headingRad = chosenRad ?? this.defaultHeading(pane, avatar, atM, waypointsM);
-    const walk: Walk = {
-      pane, avatar, requestId: nextRequestId(), atM, headingRad, waypointsM, accepted: false,
-      polledMs: performance.now(), missedPolls: 0};
+    const walk: Walk = {pane, avatar, requestId: nextRequestId(), atM, headingRad, waypointsM};
     this.host.goLive();
     this.host.showGoal(atM, chosenRad);
     this.removeWalks((other) => other.pane === pane && other.avatar === avatar);
@@ -184,7 +170,6 @@ export class WalkTool {
     void pane.world.request([
       {avatar, type: 'walk', requestId, atM, headingRad, waypointsM},
     ]).then((reply) => {
-      walk.accepted = reply.ok;
       if (!this.walks.includes(walk)) return;
       if (!reply.ok) this.removeWalks((other) => other === walk);
       this.host.notify(reply.ok ? `Walking to ${pointText(atM)}.` :
@@ -233,7 +218,7 @@ export class WalkTool {
     this.update();
   }
 
-  /** Returns true if the event ended one of the walks and the user has been notified. */
+  /** Ends the walk to which the event belongs, if any. Returns true if the user is notified. */
   onEvent(pane: WorldPane, event: WorldEvent): boolean {
     const {type, avatar} = event;
     if (type === 'removed') {
@@ -243,33 +228,20 @@ export class WalkTool {
       }
       return false;
     }
-    if (type !== 'rejected' && !(type === 'finished' && event.kind === 'stand')) return false;
+    if (event.outcome === 'none') return false;
     const walk = this.walks.find((each) =>
       each.pane === pane && each.avatar === avatar && each.requestId === event.requestId);
     if (!walk) return false;
     this.removeWalks((each) => each === walk);
     this.update();
-    this.host.notify(type === 'finished' ? `Avatar ${avatar} has arrived.` :
-      `Avatar ${avatar} stopped: ${event.reason}.`);
-    return true;
-  }
-
-  /** Finds walks that other clients have cancelled; the server sends no event for them. */
-  private pollWalks(): void {
-    const nowMs = performance.now();
-    if (!this.host.live()) return;
-    for (const walk of this.walks) {
-      if (!walk.accepted || nowMs - walk.polledMs < pollIntervalMs) continue;
-      walk.polledMs = nowMs;
-      void walk.pane.world.inspect(walk.avatar).then(({queue, queueSize}) => {
-        const queued = queueSize > queue.length ||
-          queue.some(({requestId}) => requestId === walk.requestId);
-        walk.missedPolls = queued ? 0 : walk.missedPolls + 1;
-        if (walk.missedPolls < maxMissedPolls) return;
-        this.removeWalks((each) => each === walk);
-        this.update();
-      }, () => {});
+    if (event.outcome === 'completed') {
+      this.host.notify(`Avatar ${avatar} has arrived.`);
+    } else if (event.outcome === 'rejected') {
+      this.host.notify(`Avatar ${avatar} stopped: ${event.reason}.`);
+    } else {
+      return false;  // Another client has cancelled or replaced the walk.
     }
+    return true;
   }
 
   // ---- decals
@@ -293,9 +265,8 @@ export class WalkTool {
     return goals;
   }
 
-  /** Call several times per second: polls the walks and updates the decals. */
+  /** Call several times per second: updates the decals. */
   update(): void {
-    this.pollWalks();
     const pending = this.pendingWaypoints;
     if (pending && this.target(pending.pane) !== pending.avatar) this.pendingWaypoints = null;
     for (const pane of this.host.panes) {
