@@ -23,7 +23,7 @@ import {StatisticsPanel} from './panels/statistics_panel.js';
 import {ViewPanel} from './panels/view_panel.js';
 import {Playback} from './playback.js';
 import type {TimeRange} from './playback.js';
-import {StreamCosts, streamName} from './pose_stream.js';
+import {StreamCosts, formatBytesPerPose, streamModes, streamName} from './pose_stream.js';
 import {levelCount} from './quality.js';
 import {makeRenderer} from './renderer.js';
 import type {RendererInfo} from './renderer.js';
@@ -139,6 +139,9 @@ export class App {
         makeView: (world) => new WorldView(world, this.colours, this.appearance.options),
         onOpened: (pane) => this.onPaneOpened(pane),
         onClosing: (pane) => this.onPaneClosing(pane),
+        onMovementModeFailed: (reason) => this.notify(
+          `Movement mode is not available: ${reason || 'the server has no library'}. ` +
+          'The page receives quantised poses instead.'),
       });
     this.panes = this.worldPanes.panes;
     this.camera = new CameraControl(this.panes);
@@ -424,14 +427,18 @@ export class App {
     const avatars = this.panes.reduce((sum, {view}) => sum + (view.crowd?.count ?? 0), 0);
     const recorded = this.panes.reduce((sum, {world}) => sum + world.recording.bytes, 0);
     const bytesPerPose = s.posesReceived > 0 ? s.poseBytesReceived / s.posesReceived : 0;
-    return `${avatars} avatars, ${bytesPerPose.toFixed(0)} bytes per pose ` +
+    return `${avatars} avatars, ${formatBytesPerPose(bytesPerPose)} bytes per pose ` +
       `(${streamName(this.worldPanes.poseStream)}), ${(recorded / 1e6).toFixed(1)} MB recorded, ` +
       `${s.batchesDropped} batches dropped, ${s.reconnects} reconnects. ` +
       `Rendered ${this.rendererInfo.software ? 'in software' : 'by the GPU'}.`;
   }
 
   private updateStreamCosts(ms: number, avatars: number): void {
-    const {poseStream} = this.worldPanes;
+    const {poseStream, fetchesLibrary} = this.worldPanes;
+    this.viewPanel.setStreamMode(poseStream.mode, fetchesLibrary ?
+      'Fetching the motion library. Until then, the server sends compressed poses.' :
+      streamModes[poseStream.mode].description);
+    this.status.setStreamMode(streamModes[poseStream.mode].label);
     this.viewPanel.setDetailEnabled(
       poseStream.mode === 'quantised' && this.client.state === 'ready');
     if (this.streamCosts.measure(ms, poseStream, avatars, this.client.statistics)) {

@@ -8,6 +8,7 @@ export class ConnectionStatus {
   private readonly stateText = h('span', {});
   private readonly rateText = h('span', {class: 'rate'});
   readonly element = h('span', {class: 'status', role: 'status'}, this.stateText, this.rateText);
+  private streamMode = '';
   private readonly noticeText = h('p', {});
   readonly notice = h('div', {class: 'notice', role: 'alert'}, this.noticeText);
 
@@ -17,12 +18,21 @@ export class ConnectionStatus {
     this.notice.hidden = true;
   }
 
+  /** Sets the label of the stream mode, for example `Movement`. */
+  setStreamMode(label: string): void {
+    if (this.streamMode === label) return;
+    this.streamMode = label;
+    this.update();
+  }
+
   update(): void {
     const {state} = this.client;
     const ready = state === 'ready';
     setText(this.stateText,
       ready ? 'Connected' : state === 'closed' ? 'Disconnected' : 'Connecting…');
-    setText(this.rateText, ready ? `, ${this.client.tickHz.toFixed(0)} Hz` : '');
+    setText(this.rateText, ready ?
+      `, ${this.client.tickHz.toFixed(0)} Hz` +
+        (this.streamMode && `, ${this.streamMode.toLowerCase()} mode`) : '');
     this.element.classList.toggle('ready', ready);
     const text = this.problemText();
     this.notice.hidden = text === '';

@@ -1,26 +1,38 @@
-// Options for how the server sends poses to the page, and measurements of their size.
+// Options for how the server sends avatars to the page, and measurements of their size.
 
 import type {PoseDetail, PoseMode, Statistics} from './sdk.js';
 
 export const tickIntervals = [1, 2, 4] as const;
 
+/** Stream modes: what the server sends, for the View panel. */
+export const streamModes: {readonly [mode in PoseMode]: {label: string; description: string}} = {
+  movement: {
+    label: 'Movement',
+    description: "The server sends movements, and this page computes the poses with the world's " +
+      'motion library.',
+  },
+  quantised: {label: 'Quantised', description: 'The server sends compressed poses.'},
+  full: {label: 'Full', description: 'The server sends uncompressed poses.'},
+};
+
 export interface PoseStream {
   readonly mode: PoseMode;
-  /** Joints of quantised poses. Full poses always have all joints. */
+  /** Joints of quantised poses. Other modes always have all joints. */
   readonly detail: PoseDetail;
-  /** The server sends only the poses of every n-th tick. */
+  /** The page receives, or computes, only the poses of every n-th tick. */
   readonly everyNTicks: (typeof tickIntervals)[number];
 }
 
 /** Returns the arguments for `World.observe`. */
 export function observationFor({mode, detail, everyNTicks}: PoseStream) {
-  return {mode, detail: mode === 'full' ? 'all' as const : detail, everyNTicks, withEvents: true};
+  return {
+    mode, detail: mode === 'quantised' ? detail : 'all' as const, everyNTicks, withEvents: true};
 }
 
 /** Returns a name for users, for example "Quantised, root only, ¼ rate". */
 export function streamName(stream: PoseStream): string {
   const {mode, detail, everyNTicks} = observationFor(stream);
-  return (mode === 'full' ? 'Full' : 'Quantised') +
+  return streamModes[mode].label +
     {all: '', reduced: ', reduced joints', root: ', root only'}[detail] +
     {1: '', 2: ', ½ rate', 4: ', ¼ rate'}[everyNTicks];
 }
@@ -31,6 +43,11 @@ export interface StreamCost {
   readonly active: boolean;
   readonly bytesPerPose: number;
   readonly bytesPerS: number;
+}
+
+/** For example "3.1" or "101". */
+export function formatBytesPerPose(bytes: number): string {
+  return bytes.toFixed(bytes < 10 ? 1 : 0);
 }
 
 /** Time after a change of stream during which poses of the old one may arrive. */

@@ -25,7 +25,7 @@ export function parseUrlOptions(search: string): UrlOptions {
   return {
     figures: oneOf('figures', ['auto', 'bodies', 'lines'], 'auto'),
     poseStream: {
-      mode: oneOf('mode', ['quantised', 'full'], 'quantised'),
+      mode: oneOf('mode', ['movement', 'quantised', 'full'], 'movement'),
       detail: oneOf('detail', ['all', 'reduced', 'root'], 'all'),
       everyNTicks: tickIntervals.find((interval) => query.get('every') === String(interval)) ?? 1,
     },

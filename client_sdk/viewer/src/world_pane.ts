@@ -7,6 +7,8 @@ export interface WorldPane {
   readonly world: World;
   readonly view: WorldView;
   subscription: Subscription | null;
+  /** True if the server has accepted the subscription. */
+  subscribed: boolean;
   /** Avatars that this page moves at random; null until the first one. */
   randomWalkers: RandomWalkers | null;
   /** Ids of the avatars that this page has spawned. */

@@ -3,7 +3,7 @@
 import {h, setPressed} from './dom.js';
 import {observationFor, streamName, type PoseStream} from './pose_stream.js';
 import type {WorldView} from './scene/world_view.js';
-import type {Client, Subscription, World} from './sdk.js';
+import type {Client, World} from './sdk.js';
 import type {WorldPane} from './world_pane.js';
 
 const maxPanes = 4;
@@ -20,6 +20,8 @@ export interface WorldPanesHost {
   onOpened(pane: WorldPane): void;
   /** Called before the pane's view is disposed. */
   onClosing(pane: WorldPane): void;
+  /** Called when the page has left movement mode because a world does not support it. */
+  onMovementModeFailed(reason: string): void;
 }
 
 export class WorldPanes {
@@ -42,8 +44,9 @@ export class WorldPanes {
     if (this.panes.length >= maxPanes) return;
     const world = this.client.joinWorld(name, 'controller');
     const pane: WorldPane = {
-      world, view: this.host.makeView(world), subscription: this.subscribe(world),
+      world, view: this.host.makeView(world), subscription: null, subscribed: false,
       randomWalkers: null, ownAvatars: new Set(), refusal: ''};
+    this.subscribe(pane);
     this.panes.push(pane);
     if (!this.worldNames.includes(name)) this.worldNames.push(name);
     this.host.onOpened(pane);
@@ -88,26 +91,43 @@ export class WorldPanes {
     }
   }
 
-  /** Changes how the server sends poses of all open worlds. */
+  /** True while a world waits for its motion library. It shows quantised poses until then. */
+  get fetchesLibrary(): boolean {
+    return this.stream.mode === 'movement' && this.panes.some((pane) => !pane.subscribed);
+  }
+
+  /** Changes how the server sends the avatars of all open worlds. */
   setPoseStream(stream: PoseStream): void {
     const before = streamName(this.stream);
     this.stream = stream;
     if (streamName(stream) === before) return;
     for (const pane of this.panes) {
-      const old = pane.subscription;
-      pane.subscription = this.subscribe(pane.world);
-      // The new subscription exists before the old one stops, so that poses arrive without a gap.
-      void old?.stop();
+      this.subscribe(pane);
     }
   }
 
-  private subscribe(world: World): Subscription {
-    const subscription = world.observe(observationFor(this.stream));
-    void subscription.reply.then(({status}) => {
-      // The URL may request a detail that an older server does not support.
-      if (status === 'unsupported') this.setPoseStream({...this.stream, detail: 'all'});
+  private subscribe(pane: WorldPane): void {
+    const {world, subscription: old} = pane;
+    const {mode} = this.stream;
+    // Until the client has the motion library, it keeps back the command, and all that follow.
+    const interim = old === null && mode === 'movement' ?
+      world.observe(observationFor({...this.stream, mode: 'quantised', detail: 'all'})) : old;
+    const subscription = pane.subscription = world.observe(observationFor(this.stream));
+    pane.subscribed = false;
+    // The new subscription exists before the old one stops, so that poses arrive without a gap.
+    void interim?.stop();
+    void subscription.reply.then(({ok, status, text}) => {
+      if (pane.subscription !== subscription) return;
+      pane.subscribed = ok;
+      if (ok || !['unsupported', 'version_mismatch', 'malformed'].includes(status)) return;
+      if (mode === 'movement') {
+        this.setPoseStream({...this.stream, mode: 'quantised'});
+        this.host.onMovementModeFailed(text);
+      } else {
+        // The URL may request a detail that an older server does not support.
+        this.setPoseStream({...this.stream, detail: 'all'});
+      }
     });
-    return subscription;
   }
 
   /** Updates the buttons, and writes the open worlds to the page's URL. */

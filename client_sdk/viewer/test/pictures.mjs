@@ -62,12 +62,13 @@ await picture('viewer_inspect_phone', 390, 844, 'light', 'world=generated&qualit
   await inspect(page);
   await page.waitForTimeout(1500);
 });
-// The table with the costs of several pose formats.
+// The table with the costs of several stream modes.
 await picture('viewer_streams', 1280, 720, 'light', bothWorlds, async (page) => {
   await page.click('button[aria-controls=panel-commands]');
   await page.click('button[aria-controls=panel-view]');
-  const choices =
-    ['mode-full', 'mode-quantised', 'rate-4', 'rate-1', 'detail-root', 'detail-reduced'];
+  const choices = [
+    'mode-full', 'mode-quantised', 'rate-4', 'rate-1', 'detail-root', 'detail-reduced',
+    'mode-movement'];
   for (const id of choices) {
     await page.click(`label[for=${id}]`);
     await page.waitForTimeout(4000);

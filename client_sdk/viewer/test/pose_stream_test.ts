@@ -7,7 +7,9 @@ import {StreamCosts, streamName, observationFor, type PoseStream} from '../src/p
 const all: PoseStream = {mode: 'quantised', detail: 'all', everyNTicks: 1};
 const root: PoseStream = {mode: 'quantised', detail: 'root', everyNTicks: 4};
 
-test('requests all joints for full poses, whatever the detail', () => {
+test('requests all joints unless poses are quantised', () => {
+  assert.equal(observationFor({...root, mode: 'movement'}).detail, 'all');
+  assert.equal(streamName({...root, mode: 'movement'}), 'Movement, ¼ rate');
   assert.equal(observationFor({...root, mode: 'full'}).detail, 'all');
   assert.equal(streamName({...root, mode: 'full'}), 'Full, ¼ rate');
   assert.equal(streamName(root), 'Quantised, root only, ¼ rate');

@@ -13,7 +13,7 @@ test('reads all options from the URL', () => {
 
 test('uses defaults for missing and invalid options', () => {
   const defaults = {
-    figures: 'auto', poseStream: {mode: 'quantised', detail: 'all', everyNTicks: 1},
+    figures: 'auto', poseStream: {mode: 'movement', detail: 'all', everyNTicks: 1},
     quality: 'auto', maxFramesPerS: Infinity, worlds: []};
   assert.deepEqual(parseUrlOptions(''), defaults);
   const invalid =

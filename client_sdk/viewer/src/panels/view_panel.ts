@@ -1,7 +1,8 @@
-// The view panel: how avatars are drawn, which decals are shown, and how the server sends poses.
+// The view panel: how avatars are drawn, which decals are shown, and the stream mode.
 
 import {h, setText} from '../dom.js';
 import type {FigureStyle, QualityChoice} from '../quality.js';
+import {formatBytesPerPose, streamModes} from '../pose_stream.js';
 import type {StreamCost, PoseStream} from '../pose_stream.js';
 import {formatBytes} from './plot.js';
 
@@ -18,6 +19,8 @@ interface ViewActions {
 export class ViewPanel {
   readonly element: HTMLElement;
   private readonly qualityText = h('p', {class: 'hint'});
+  private readonly streamText = h('p', {class: 'hint', id: 'stream-mode'});
+  private readonly modeChoice: HTMLFieldSetElement;
   private readonly checkboxes = new Map<Toggle, HTMLInputElement>();
   private readonly detailChoice: HTMLFieldSetElement;
   private readonly costs = h('tbody');
@@ -26,6 +29,9 @@ export class ViewPanel {
   constructor(actions: ViewActions, initial: {
     figures: FigureChoice; quality: QualityChoice; stream: PoseStream;
   }) {
+    this.modeChoice = radios('Stream mode', 'mode',
+      Object.entries(streamModes).map(([mode, {label}]) => [mode, label]), initial.stream.mode,
+      (value) => actions.stream({mode: value as PoseStream['mode']}));
     this.detailChoice = radios(
       'Joints', 'detail', [['all', 'All'], ['reduced', 'Reduced'], ['root', 'Root only']],
       initial.stream.detail, (value) => actions.stream({detail: value as PoseStream['detail']}));
@@ -38,21 +44,25 @@ export class ViewPanel {
       this.qualityText,
       this.check('shadows', 'Shadows', actions), this.check('footprints', 'Footprints', actions),
       this.check('plantedFeet', 'Planted feet', actions),
-      radios('Pose format', 'mode', [['quantised', 'Quantised'], ['full', 'Full']],
-        initial.stream.mode, (value) => actions.stream({mode: value as PoseStream['mode']})),
-      this.detailChoice,
+      this.modeChoice, this.streamText, this.detailChoice,
       radios('Pose rate', 'rate', [['1', 'Full'], ['2', 'Half'], ['4', 'Quarter']],
         String(initial.stream.everyNTicks),
         (value) => actions.stream({everyNTicks: Number(value) as PoseStream['everyNTicks']})),
       h('table', {class: 'costs'},
-        h('caption', {}, 'Measured cost of the formats used'),
-        h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Format'),
+        h('caption', {}, 'Measured cost of the modes used'),
+        h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Mode'),
           h('th', {scope: 'col'}, 'Per pose'), h('th', {scope: 'col'}, 'Per second'))),
         this.costs));
   }
 
   setChecked(name: Toggle, on: boolean): void {
     this.checkboxes.get(name)!.checked = on;
+  }
+  /** Shows the current stream mode, and an explanation of it. */
+  setStreamMode(mode: PoseStream['mode'], text: string): void {
+    const input = this.modeChoice.querySelector<HTMLInputElement>(`#mode-${mode}`)!;
+    input.checked = true;
+    setText(this.streamText, text);
   }
   /**
    * Enables or disables the choice of joints, which requires quantised poses and a server that
@@ -64,7 +74,7 @@ export class ViewPanel {
   setCosts(costs: readonly StreamCost[]): void {
     this.costs.replaceChildren(...costs.map(({name, active, bytesPerPose, bytesPerS}) => h('tr',
       {'aria-current': active && 'true'}, h('th', {scope: 'row'}, name),
-      h('td', {}, `${bytesPerPose.toFixed(0)} B`), h('td', {}, formatBytes(bytesPerS)))));
+      h('td', {}, `${formatBytesPerPose(bytesPerPose)} B`), h('td', {}, formatBytes(bytesPerS)))));
   }
   /** Text beneath the choice of quality. */
   setQualityText(text: string): void {

@@ -363,6 +363,18 @@ function streamChecks(t) {
       await waitFor('poses are smaller',
         async () => await t.measureBytesPerPose() < full - 150);
     }],
+    ['view: mode-movement', async () => {
+      const quantised = await t.measureBytesPerPose();
+      await choose('mode-movement');
+      await waitFor('poses are smaller',
+        async () => await t.measureBytesPerPose() < quantised - 40);
+      await eventually('the page states the mode', () =>
+        document.querySelector('.status').textContent.endsWith('movement mode') &&
+        document.getElementById('stream-mode').textContent.includes('sends movements'));
+      await choose('mode-quantised');
+      await eventually('the page states the mode', () =>
+        document.querySelector('.status').textContent.endsWith('quantised mode'));
+    }],
     // Columns: the detail, its flag in poses, its name in the table, and the minimum bytes saved.
     ...[
       ['root', 16, 'Quantised, root only', 70], ['reduced', 8, 'Quantised, reduced joints', 5],
