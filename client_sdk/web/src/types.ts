@@ -16,7 +16,8 @@ export type Role = 'controller' | 'observer';
  * - `quantised`: about a quarter of the bytes; no joint or end site is off by more than 1 mm.
  *   Older servers send quantised poses of 40 % of the bytes of `full`.
  * - `movement`: the client evaluates movements with the world's motion library, which it fetches
- *   from the server first. The poses are exactly those of the server. They are not recorded.
+ *   from the server first. The poses are exactly those of the server. A recording stores them with
+ *   the precision of `quantised`.
  */
 export type PoseMode = 'full' | 'quantised' | 'movement';
 /**
