@@ -288,6 +288,10 @@ function appearanceChecks(t, shared) {
       await t.requestSteps();
       await eventually('there are footprints', (n) =>
         window.stridewire.sampled()[0].footprints >= n, before + 4);
+      // Events arrive before the frames that show them.
+      const timeS = await look(() => window.stridewire.client.serverTimeS());
+      await eventually('they are drawn', (t) =>
+        window.stridewire.sampled()[0].timeS >= t, timeS);
       await look(() => window.stridewire.playback.pause());
       await shared.changesScene('view-footprints');
     }],
