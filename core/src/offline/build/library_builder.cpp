@@ -15,6 +15,7 @@
 #include "offline/build/library_writer.h"
 #include "offline/build/select_examples.h"
 #include "offline/build/smooth_examples.h"
+#include "offline/build/smooth_jolts.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/weights/measure.h"
 
@@ -243,6 +244,7 @@ class GroupConverter {
       report.ridge_radius = smoothness->radius;
       Note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
     }
+    if (builder_.smooths && selects && IsStep(group.kind)) SmoothNoise(examples);
     STRIDEWIRE_CHECK(report.examples.size() == group.examples.size());
     builder_.selections.push_back(std::move(report));
     return examples;
@@ -258,6 +260,16 @@ class GroupConverter {
     view.kind = group.kind;
     view.parameters = ParametersOf(group, found);
     return SmoothExamples(view, layout_, raw_.skeleton, examples);
+  }
+
+  void SmoothNoise(std::vector<GridExample>& examples) {
+    int smoothed = 0;
+    for (GridExample& example : examples) {
+      smoothed += SmoothJolts(raw_.skeleton, layout_, example) ? 1 : 0;
+    }
+    if (smoothed > 0) {
+      Note(std::to_string(smoothed) + " examples smoothed where joints jolt");
+    }
   }
 
   void NoteSelection(const GroupSelection& selection, std::size_t stored) {

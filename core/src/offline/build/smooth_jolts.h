@@ -1,0 +1,26 @@
+#pragma once
+
+#include "offline/build/grid_example.h"
+#include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/skeleton.h"
+
+namespace stridewire {
+
+// Smooths trunk, head and arms of an example where they jolt (decision 0048). A joint jolts if its
+// angular acceleration over two grid cells exceeds 250 rad/s^2, both relative to its parent and in
+// the world. Jolts are noise of the recording that averaging did not remove, because few examples
+// are similar. They are visible as pops, above all where steps are played faster.
+//
+// - A joint is replaced by its mean with Gaussian weights. The standard deviation grows from 0
+//   until the acceleration is within the limit, or up to 60 ms. It varies gradually, so that grid
+//   points further than 0.15 s from all jolts remain unchanged. The first and the last point remain
+//   unchanged as well.
+// - The children of a smoothed joint keep their rotation in the world. If they compensate the noise
+//   of that joint, it disappears from them as well.
+// - The root and the legs are not smoothed: their rotations determine where feet stand. Nor are
+//   fingers and thumbs (see RemoveJointNoise).
+//
+// Returns true if a joint was smoothed.
+bool SmoothJolts(const Skeleton& skeleton, const GridLayout& layout, GridExample& example);
+
+}  // namespace stridewire
