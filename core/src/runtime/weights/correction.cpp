@@ -35,6 +35,8 @@ constexpr double kVariedRad = 0.04;
 constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
 // Largest change of a weight relative to its value, before the effect on the parameters is removed.
 constexpr double kMaxRelativeChange = 3.0;
+// Groups with fewer captured examples per coefficient of the linear part have few examples.
+constexpr int kExamplesPerCoefficient = 4;
 // A variation is given up if it leaves an error above this.
 constexpr double kMaxVariedErrorM = 1e-4;
 
@@ -48,6 +50,18 @@ double SumOfMagnitudes(std::span<const double> values) {
   double sum = 0.0;
   for (const double value : values) sum += std::fabs(value);
   return sum;
+}
+
+// Scales negative weights, and the others so that the sum remains 1, until the sum of |w| is at
+// most `max_sum`.
+void LimitNegativeWeights(double max_sum, std::span<double> weights) {
+  double negative = 0.0;
+  for (const double weight : weights) negative -= std::min(weight, 0.0);
+  const double allowed = 0.5 * (max_sum - 1.0);
+  if (negative <= allowed) return;
+  for (double& weight : weights) {
+    weight *= weight < 0.0 ? allowed / negative : (1.0 + allowed) / (1.0 + negative);
+  }
 }
 
 // Cholesky factorization L L^T = matrix. Stores L in the lower triangle, including the diagonal.
@@ -197,7 +211,15 @@ void AddVariation(std::span<const double> change, double size_rad, double max_su
 }  // namespace
 
 CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group) {
-  return {.max_iterations = group.parameter_count() <= 2 ? 3 : 8};
+  CorrectionLimits limits{.max_iterations = group.parameter_count() <= 2 ? 3 : 8};
+  const bool has_heights = group.FindParameter(ParameterName::kStartY) >= 0 ||
+                           group.FindParameter(ParameterName::kEndY) >= 0;
+  const int enough = kExamplesPerCoefficient * (group.parameter_count() + 1);
+  if (has_heights && !group.is_completed && group.example_count < enough) {
+    limits.start_weight_sum = kSparseStartWeightSum;
+    limits.weight_sum = kSparseWeightSum;
+  }
+  return limits;
 }
 
 CorrectionScratch::CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout,
@@ -248,7 +270,8 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
   };
 
   SetWeights(group, -1, std::span(wanted.values).first(d), weights, movement);
-  const double max_sum = std::max(kMaxCorrectedWeightSum, SumOfMagnitudes(weights));
+  LimitNegativeWeights(limits.start_weight_sum, weights);
+  const double max_sum = std::max(limits.weight_sum, SumOfMagnitudes(weights));
   const bool is_varied = variation.has_value() && d <= kMaxVariedParameters;
   if (is_varied) {
     for (std::size_t l = 0; l < d; ++l) {

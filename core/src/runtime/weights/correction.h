@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -12,19 +13,31 @@
 
 namespace stridewire {
 
-/// Conditions under which a correction stops.
-struct CorrectionLimits {
-  int max_iterations = 3;
-  double tolerance_m = 1e-5;  ///< Stop when the error is at most this.
-};
-
-/// Returns the limits for starting a movement: 3 iterations for groups with one or two parameters
-/// (straight steps, jumps) and 8 iterations for others.
-[[nodiscard]] CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group);
-
 /// Limit on the sum of |w| after correction. If the sum is already larger without correction, that
 /// sum is the limit.
 inline constexpr double kMaxCorrectedWeightSum = 2.5;
+
+/// Conditions under which a correction stops, and limits on its weights.
+struct CorrectionLimits {
+  int max_iterations = 3;
+  double tolerance_m = 1e-5;  ///< Stop when the error is at most this.
+  /// Negative weights are scaled until the sum of |w| before the correction is at most this.
+  double start_weight_sum = HUGE_VAL;
+  double weight_sum = kMaxCorrectedWeightSum;  ///< Limit on the sum of |w| after correction.
+};
+
+/// Limits on the sum of |w| for climbing steps from few captured examples (decision 0048).
+inline constexpr double kSparseStartWeightSum = 1.1;
+inline constexpr double kSparseWeightSum = 1.4;
+
+/// Returns the limits for starting a movement: 3 iterations for groups with one or two parameters
+/// (straight steps, jumps) and 8 iterations for others.
+///
+/// Groups with height parameters and fewer than four captured examples per coefficient of the
+/// linear part of the weights (d + 1) have smaller limits on weights. Otherwise, requests near the
+/// border of their hull would amplify the individual variation of the examples, and knees and
+/// pelvis would jolt. What the weights miss, planting corrects.
+[[nodiscard]] CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group);
 
 /// Result of a correction.
 struct Correction {
@@ -71,6 +84,8 @@ class CorrectionScratch {
 ///
 /// Of all changes that correct the parameters to first order, this is the smallest relative to how
 /// much each example is used. a(w) and J depend only on the first and the last pose.
+///
+/// If the sum of |w| exceeds `limits.start_weight_sum`, negative weights are scaled first.
 ///
 /// If the sum of |w| would come within 0.1 of its limit, the part of w that does not affect the
 /// parameters shrinks as far as necessary. A step that increases the error or makes the weights too
