@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-constexpr double kJoltRadPerS2 = 250.0;
+constexpr double kJoltRadPerS2 = 400.0;
 // Standard deviation of the mean: growth per round and largest value.
 constexpr double kDeviationGrowthS = 0.005;
 constexpr double kMaxDeviationS = 0.06;
@@ -131,10 +131,7 @@ bool SmoothJolts(const Skeleton& skeleton, const GridLayout& layout, GridExample
   const double spacing_s = duration_s / static_cast<double>(points - 1);
   const auto joints = static_cast<std::size_t>(skeleton.joint_count());
   const std::vector<bool> is_smoothed = SmoothedJoints(skeleton);
-  // Rotations in the world after smoothing, and rotations from those to the original ones,
-  // [joint][point]. The latter are empty for joints that did not change.
-  std::vector<JointTrack> worlds(joints, JointTrack(points));
-  std::vector<JointTrack> changes(joints);
+  std::vector<JointTrack> worlds(joints, JointTrack(points));  // After smoothing, [joint][point].
   bool has_changed = false;
   for (std::size_t j = 0; j < joints; ++j) {
     JointTrack track(points);
@@ -146,23 +143,12 @@ bool SmoothJolts(const Skeleton& skeleton, const GridLayout& layout, GridExample
       continue;
     }
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
-    const bool inherits = !changes[parent].empty();
-    for (std::size_t p = 0; p < points && inherits; ++p) {
-      track[p] = Normalise(changes[parent][p] * track[p]);
-    }
-    const JointTrack before = track;
     const bool is_changed = is_smoothed[j] && JoltFilter(track, worlds[parent], spacing_s).Run();
     for (std::size_t p = 0; p < points; ++p) worlds[j][p] = worlds[parent][p] * track[p];
-    if (!is_changed && !inherits) continue;
-    for (std::size_t p = 0; p < points; ++p) {
-      GridLayout::SetRotation(&example.rows[p * row_floats], j, track[p]);
-    }
     if (!is_changed) continue;
     has_changed = true;
-    changes[j].resize(points);
     for (std::size_t p = 0; p < points; ++p) {
-      const Quat change = Normalise(glm::conjugate(track[p]) * before[p]);
-      changes[j][p] = change.w < 0.0f ? -change : change;
+      GridLayout::SetRotation(&example.rows[p * row_floats], j, track[p]);
     }
   }
   return has_changed;

@@ -7,7 +7,7 @@
 namespace stridewire {
 
 // Smooths trunk, head and arms of an example where they jolt (decision 0048). A joint jolts if its
-// angular acceleration over two grid cells exceeds 250 rad/s^2, both relative to its parent and in
+// angular acceleration over two grid cells exceeds 400 rad/s^2, both relative to its parent and in
 // the world. Jolts are noise of the recording that averaging did not remove, because few examples
 // are similar. They are visible as pops, above all where steps are played faster.
 //
@@ -15,8 +15,8 @@ namespace stridewire {
 //   until the acceleration is within the limit, or up to 60 ms. It varies gradually, so that grid
 //   points further than 0.15 s from all jolts remain unchanged. The first and the last point remain
 //   unchanged as well.
-// - The children of a smoothed joint keep their rotation in the world. If they compensate the noise
-//   of that joint, it disappears from them as well.
+// - The children of a smoothed joint turn with it. If they compensated its noise, they jolt in the
+//   world afterwards, but by less than the limit.
 // - The root and the legs are not smoothed: their rotations determine where feet stand. Nor are
 //   fingers and thumbs (see RemoveJointNoise).
 //

@@ -329,8 +329,8 @@ TEST_P(CompleteCaptures, EveryTakePassesTheSelfCheck) {
 
 // Subject 08 takes long strides, 17 sneaks, and 135 kicks.
 INSTANTIATE_TEST_SUITE_P(Subjects, CompleteCaptures,
-                         testing::Values(kDebianTakes, "05", "06", "09", "29", "32", "../gaits/08",
-                                         "../gaits/17", "../gaits/135"),
+                         testing::Values(kDebianTakes, "05", "06", "09", "29", "32", "gaits/08",
+                                         "gaits/17", "gaits/135"),
                          [](const auto& param) {
                            std::string name = param.param;
                            std::erase_if(name, [](char c) { return !IsAlphanumeric(c); });
