@@ -19,8 +19,10 @@ export function makeReply(code: number, text: string, message?: ReplyMessage): R
   };
 }
 
-/** Makes the reply to a command that was not sent, because of this error. */
+/** Makes the reply to a command that was not sent, because of this error. Throws the error if the
+ * WebAssembly module has stopped, because then nothing works any more. */
 export function refusal(error: unknown): Reply {
+  if (error instanceof WebAssembly.RuntimeError) throw error;
   if (error instanceof StridewireError) return makeReply(error.code, error.message);
   return makeReply(Status.invalid_argument, error instanceof Error ? error.message : '');
 }

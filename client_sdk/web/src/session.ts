@@ -193,16 +193,25 @@ export class Session {
   }
 
   private moveRegion(world: WorldHandle, id: number, region: Region): Promise<Reply> {
-    return this.command(world, () => {
-      const active = world.subscriptions.get(id);
-      if (active === undefined || active.message.region === null) {
-        throw new StridewireError(Status.no_such_subscription, 'The subscription has no region.');
+    return new Promise((resolve) => this.run(() => {
+      try {
+        const active = world.subscriptions.get(id);
+        if (active === undefined || active.message.region === null) {
+          throw new StridewireError(
+              Status.no_such_subscription, 'The subscription has no region.');
+        }
+        const moved = {...active.message, region: commands.region(region, active.message.detail)};
+        checkMessage(moved);
+        if (active.handle === 0) {  // It has never been sent.
+          resolve(makeReply(0, ''));
+        } else {
+          this.submit(world, {...moved, subscription: active.handle, replace: true}, resolve);
+        }
+        active.message = moved;
+      } catch (error) {
+        resolve(refusal(error));
       }
-      const moved = {...active.message, region: commands.region(region, active.message.detail)};
-      checkMessage(moved);
-      active.message = moved;
-      return {...moved, subscription: active.handle, replace: true};
-    });
+    }));
   }
 
   private stopObserving(world: WorldHandle, id: number): Promise<Reply> {

@@ -259,3 +259,15 @@ test('sends the detail of each ring of a region', async () => {
   const {text} = await observed.moveRegion(region('none' as 'all'));
   assert.match(text, /region.ringDetails\[0\]/);
 });
+
+test('moves the region of an observation that has not been sent', async () => {
+  const h = new Harness();
+  const world = h.session.joinWorld('plaza', 'observer');
+  const observed = world.observe({mode: 'quantised', region: region()});
+  assert.ok((await observed.moveRegion({...region(), x: 5})).ok);
+  assert.match((await observed.moveRegion({...region(), x: NaN})).text, /region.centreM/);
+  h.connect();
+  h.receive(server.worldInfo(1n, 3, 'plaza'), server.reply(1n));
+  const sent = h.sent().filter((m) => m.type === 'Observe');
+  assert.deepEqual(sent.map((m) => m.region?.centreM[0]), [5]);
+});

@@ -233,8 +233,12 @@ std::int32_t DecodePoses(std::size_t info_bytes, std::size_t bytes) {
   std::shared_ptr<const protocol::CompactCodecs> codecs;
   if (info_bytes > 0) {
     auto message = DecodeInput(info_bytes, protocol::Sender::kServer);
-    const auto* info = message ? std::get_if<protocol::WorldInfo>(&*message) : nullptr;
-    if (info == nullptr) return -1;
+    if (!message) return -1;
+    const auto* info = std::get_if<protocol::WorldInfo>(&*message);
+    if (info == nullptr) {
+      SetText("expected a WorldInfo");
+      return -1;
+    }
     codecs = WorldView::MakeCodecs(*info);
   }
   const auto frame = protocol::ParseFrame(Input(info_bytes + bytes).subspan(info_bytes),
@@ -246,7 +250,10 @@ std::int32_t DecodePoses(std::size_t info_bytes, std::size_t bytes) {
     return -1;
   }
   const auto* batch = std::get_if<protocol::PoseBatch>(&*message);
-  if (batch == nullptr) return -1;
+  if (batch == nullptr) {
+    SetText("expected a PoseBatch");
+    return -1;
+  }
   const std::size_t joints = batch->info.joint_count;
   crowd.Resize(batch->avatars.size(), joints);
   protocol::PoseBatchReader reader(*batch, codecs ? codecs->Find(batch->info.mode) : nullptr);
