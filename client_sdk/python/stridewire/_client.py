@@ -54,6 +54,9 @@ def _address(text: str) -> _abi.stridewire_address:
 
 def _ids(avatars: Iterable[int]) -> Any:
     ids = list(avatars)
+    for avatar in ids:
+        if not 0 <= avatar < 2**32:  # ctypes would wrap it.
+            raise ValueError(f"expected ids of avatars from 0 to 4294967295, got {avatar}")
     return (c.c_uint32 * len(ids))(*ids)
 
 
@@ -234,6 +237,9 @@ class World:
 
     def _watch(self, event: Event) -> None:
         # Stores the last events of the requests of this object, for wait().
+        if event.type == EventType.SESSION_LOST:
+            self._open.clear()
+            self._skeleton = None  # The next session may have another library.
         if event.world == self._handle and event.request_id in self._open and event.outcome:
             self._open.discard(event.request_id)
             self._ended[event.request_id] = event
@@ -247,8 +253,8 @@ class World:
 
     def leave(self) -> None:
         """Leaves the world, which removes the avatars that this client has spawned in it."""
-        self.client._watchers.remove(self._watch)
         self._command(_library.stridewire_client_leave_world)
+        self.client._watchers.remove(self._watch)
 
     # Avatars.
 
@@ -339,16 +345,17 @@ class World:
         self._command(_library.stridewire_client_cancel, _ids(avatars), len(avatars))
 
     def wait(self, request_id: int, timeout_s: float = 60.0) -> Event:
-        """Waits until a request has ended, and returns its last event. See its `outcome`."""
+        """Waits until a request has ended, and returns its last event. See its `outcome`. Raises
+        StridewireError if the session is lost meanwhile, because the request then has no event."""
         if request_id not in self._open and request_id not in self._ended:
             raise ValueError(f"no request has the id {request_id}, or its last event was already "
                              "returned or dropped")
-        deadline = time.monotonic() + timeout_s
-        while request_id not in self._ended:
-            left_s = deadline - time.monotonic()
-            if left_s <= 0.0:
-                raise StridewireError("timeout", f"request {request_id} has not ended in time")
-            self.client._pump(min(left_s, 1.0))
+        if request_id not in self._ended:
+            event = self.client._wait(
+                lambda event: request_id in self._ended or event.type == EventType.SESSION_LOST,
+                f"request {request_id} has not ended", timeout_s)
+            if request_id not in self._ended:
+                raise StridewireError("session_lost", event.text)
         return self._ended.pop(request_id)
 
     # Layers.

@@ -38,13 +38,19 @@ from stridewire import Foot, Interrupt, Outcome, StridewireError, _abi  # noqa: 
 from stridewire.plot import plot_walk  # noqa: E402
 
 
-def start_server():
+def start_server(address="127.0.0.1:0"):
     """Starts a server. Returns the process and its address."""
     process = subprocess.Popen(
-        [SERVER, "--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--log-level", "warning"],
+        [SERVER, "--listen", address, "--http", "127.0.0.1:0", "--log-level", "warning"],
         stdout=subprocess.PIPE, text=True)
     ready = process.stdout.readline()
     return process, re.search(r"listen=(\S+)", ready).group(1)
+
+
+def stop(server):
+    server.terminate()
+    server.wait()
+    server.stdout.close()
 
 
 class Layout(unittest.TestCase):
@@ -89,9 +95,7 @@ class Live(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        cls.server.terminate()
-        cls.server.wait()
-        cls.server.stdout.close()
+        stop(cls.server)
 
     def test_example_of_the_readme(self):
         text = (ROOT / "client_sdk/python/README.md").read_text()
@@ -216,6 +220,22 @@ class Live(unittest.TestCase):
                 world.wait(stands[0])
             self.assertEqual(world.wait(stands[1]).outcome, Outcome.COMPLETED)
 
+    def test_wait_ends_when_the_session_is_lost(self):
+        first, address = start_server()
+        self.addCleanup(stop, first)
+        with stridewire.Client(address) as client:
+            world = client.join("lost")
+            stand = world.stand(world.spawn(), 100.0)
+            first.kill()
+            first.wait()
+            second, _ = start_server(address)
+            self.addCleanup(stop, second)
+            with self.assertRaises(StridewireError) as caught:
+                world.wait(stand, 30.0)
+            self.assertEqual(caught.exception.status, "session_lost")
+            with self.assertRaises(ValueError):
+                world.wait(stand)
+
     def test_layers_and_movement_mode(self):
         with stridewire.Client(self.address) as client:
             world = client.join("layers")
@@ -228,7 +248,12 @@ class Live(unittest.TestCase):
             self.assertGreater(len(recording.times_s), 5)
             self.assertIsNotNone(world.sample(avatar))
             world.stop_observing(subscription)
+            with self.assertRaisesRegex(ValueError, "ids of avatars"):
+                world.cancel(-1)
             world.leave()
+            with self.assertRaises(StridewireError) as caught:
+                world.leave()
+            self.assertEqual(caught.exception.status, "no_such_world")
 
     def test_connection_errors(self):
         for address in ("localhost", "127.0.0.1:72956", "127.0.0.1:-1"):
