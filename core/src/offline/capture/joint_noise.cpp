@@ -1,7 +1,9 @@
 #include "offline/capture/joint_noise.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
 
 namespace stridewire {
 namespace {
@@ -45,6 +47,23 @@ bool IsAnkle(const Skeleton& skeleton, int joint) {
 // The rotations of a joint in successive frames.
 using RotationTrack = std::vector<Quat>;
 
+// [frame][k - 1]: angle between the rotations of a frame and of the k-th sample after it. Windows
+// overlap, so each angle belongs to many of them.
+using PairAngles = std::vector<std::array<double, 2 * kMaxReachSamples>>;
+
+PairAngles AnglesOf(const RotationTrack& track, int stride) {
+  PairAngles angles(track.size());
+  for (std::size_t f = 0; f < track.size(); ++f) {
+    std::size_t other = f;
+    for (double& angle : angles[f]) {
+      other += static_cast<std::size_t>(stride);
+      if (other >= track.size()) break;
+      angle = AngleBetween(track[f], track[other]);
+    }
+  }
+  return angles;
+}
+
 // The rotations of a track that are at most `reach` frames before or after a frame, or every n-th
 // of them. The number of samples is limited, because the median compares all pairs.
 class Window {
@@ -56,13 +75,19 @@ class Window {
         begin_(frame - std::min(reach, frame) / stride_ * stride_),
         end_(std::min(frame + reach + 1, static_cast<int>(track.size()))) {}
 
+  [[nodiscard]] int stride() const { return stride_; }
+
   // Returns the rotation with the smallest sum of angles to all others.
-  [[nodiscard]] Quat Median() const {
+  [[nodiscard]] Quat Median(const PairAngles& angles) const {
     Quat best = At(frame_);
     double least = HUGE_VAL;
     for (int f = begin_; f < end_; f += stride_) {
       double sum = 0.0;
-      for (int g = begin_; g < end_; g += stride_) sum += AngleBetween(At(f), At(g));
+      for (int g = begin_; g < end_; g += stride_) {
+        if (g == f) continue;
+        const auto apart = static_cast<std::size_t>(std::abs(f - g) / stride_);
+        sum += angles[static_cast<std::size_t>(std::min(f, g))][apart - 1];
+      }
       if (sum < least) {
         least = sum;
         best = At(f);
@@ -115,10 +140,13 @@ double LargestAcceleration(const RotationTrack& track, double fps) {
 
 void Apply(const NoiseFilter& filter, double fps, RotationTrack& track) {
   const auto frames = [&](double seconds) { return static_cast<int>(std::lround(seconds * fps)); };
-  RotationTrack medians(track.size());
+  RotationTrack medians = track;
   const auto count = static_cast<int>(track.size());
-  for (int f = 0; f < count; ++f) {
-    medians[static_cast<std::size_t>(f)] = Window(track, f, frames(filter.median_reach_s)).Median();
+  if (const int reach = frames(filter.median_reach_s); reach > 0) {
+    const PairAngles angles = AnglesOf(track, Window(track, 0, reach).stride());
+    for (int f = 0; f < count; ++f) {
+      medians[static_cast<std::size_t>(f)] = Window(track, f, reach).Median(angles);
+    }
   }
   for (int f = 0; f < count; ++f) {
     track[static_cast<std::size_t>(f)] =
