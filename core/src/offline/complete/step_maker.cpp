@@ -1,6 +1,7 @@
 #include "offline/complete/step_maker.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -79,6 +80,8 @@ struct HermiteCurve {
   }
 };
 
+// Generates one step. What the captures and the timing determine at a moment is evaluated once, as
+// a Moment. Detour, lift and lowering of the root are then found by cheap corrections.
 class StepGenerator {
  public:
   StepGenerator(const Person& person, Foot moving, const StepFeet& feet)
@@ -86,7 +89,8 @@ class StepGenerator {
         stride_(person.strides[Index(moving)]),
         moving_(moving),
         fixed_(OtherFoot(moving)),
-        feet_(feet) {
+        feet_(feet),
+        reach_m_{ReachOf(Foot::kLeft), ReachOf(Foot::kRight)} {
     const double stand_z = person.StandVector(moving).z;
     start_share_ = Share((stand_z - feet.start_m.z) / (stand_z + stride_.start_length_m));
     end_share_ = Share((feet.end_m.z - stand_z) / (stride_.end_length_m - stand_z));
@@ -103,10 +107,14 @@ class StepGenerator {
     example.source = std::move(source);
     example.clip.fps = kFps;
     example.clip.Resize(frames, person_.skeleton.joint_count());
-    const std::vector<double> lowered_m = Lowering(frames);
-    const DVec3 origin = RootAt(0.0);
+    std::vector<Moment> moments;
+    moments.reserve(static_cast<std::size_t>(frames));
+    for (int f = 0; f < frames; ++f) moments.push_back(MomentAt(f / kFps));
+    const std::vector<double> lowered_m = Lowering(moments);
+    const DVec3 origin = moments.front().root_m;
     for (int f = 0; f < frames; ++f) {
-      Pose pose = PoseAt(f / kFps, lowered_m[static_cast<std::size_t>(f)]);
+      const auto i = static_cast<std::size_t>(f);
+      Pose pose = PoseAt(moments[i], lowered_m[i]);
       pose.root_position_m -=
           Vec3(static_cast<float>(origin.x), 0.0f, static_cast<float>(origin.z));
       PoseSpan out = example.clip.frame(f);
@@ -119,6 +127,21 @@ class StepGenerator {
   }
 
  private:
+  struct Leg {
+    DQuat ankle_rotation;       // World rotation of the foot in the step.
+    DVec3 ball_m = DVec3(0.0);  // Without detour and lift, relative to the fixed ball.
+    DVec3 hip_m = DVec3(0.0);   // Relative to the root.
+    DVec3 ankle_to_ball = DVec3(0.0);
+    DVec3 ankle_to_tip = DVec3(0.0);
+    DVec3 ankle_to_heel = DVec3(0.0);
+  };
+  struct Moment {
+    double generic = 0.0;
+    DVec3 root_m = DVec3(0.0);  // Before it is lowered into the reach of the legs.
+    Pose posture;               // Before inverse kinematics, with the root at the origin.
+    std::array<Leg, 2> legs;    // [Foot]
+  };
+
   static double Share(double share) { return std::clamp(share, 0.0, kMaxShare); }
   static double ToFrames(double time_s) { return std::floor(time_s * kFps + 0.5) / kFps; }
 
@@ -163,6 +186,37 @@ class StepGenerator {
     return share + std::max(0.0, kMinSwingShare - share) * Bump(SwingAt(GenericAt(time_s)));
   }
 
+  [[nodiscard]] Moment MomentAt(double time_s) const {
+    Moment moment;
+    moment.generic = GenericAt(time_s);
+    const PostureSample stride = stride_.At(moment.generic);
+    moment.root_m = RootAt(time_s, stride);
+    moment.posture = PostureAt(time_s, stride);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      moment.legs[Index(foot)] = LegAt(foot, time_s, stride, moment.posture);
+    }
+    return moment;
+  }
+  [[nodiscard]] Leg LegAt(Foot foot, double time_s, const PostureSample& stride,
+                          const Pose& posture) const {
+    const LegRig::Side& side = person_.rig.side(foot);
+    LegPose pose;
+    EvaluateLeg(person_.skeleton, person_.rig, posture, foot, pose);
+    Leg leg;
+    leg.ankle_rotation = AnkleRotationAt(foot, time_s, stride);
+    leg.ball_m = PlainBallAt(foot, time_s, stride);
+    leg.hip_m = DVec3(pose.positions_m[static_cast<std::size_t>(side.hip)]);
+    const auto ankle = static_cast<std::size_t>(side.ankle);
+    const auto from_ankle = [&](const Vec3& point) {
+      return leg.ankle_rotation * (glm::conjugate(DQuat(pose.world_rotations[ankle])) *
+                                   DVec3(point - pose.positions_m[ankle]));
+    };
+    leg.ankle_to_ball = from_ankle(pose.ball_m);
+    leg.ankle_to_tip = from_ankle(pose.toe_tip_m);
+    leg.ankle_to_heel = leg.ankle_rotation * DVec3(side.heel_m);
+    return leg;
+  }
+
   void PlanRoot() {
     const PostureSample& first = stride_.points.front();
     const PostureSample& last = stride_.points.back();
@@ -190,11 +244,11 @@ class StepGenerator {
   }
 
   // Returns the root before it is lowered into the reach of the legs.
-  [[nodiscard]] DVec3 RootAt(double time_s) const {
+  [[nodiscard]] DVec3 RootAt(double time_s, const PostureSample& stride) const {
     const double generic = GenericAt(time_s);
     const double share = std::min(1.0, ShareAt(time_s));
     const double captured_s = CapturedTimeAt(generic);
-    DVec3 deviation = share * (stride_.At(generic).root_m - captured_.At(captured_s));
+    DVec3 deviation = share * (stride.root_m - captured_.At(captured_s));
     const double heading = HeadingAt(time_s);
     // The speed of the pelvis varies in proportion to the speed of the walk.
     const double usual_m_s = share * captured_.VelocityAt(captured_s).z;
@@ -207,20 +261,27 @@ class StepGenerator {
     return root_.At(time_s) + RotateYaw(heading, deviation + sway);
   }
 
-  [[nodiscard]] DVec3 BallAt(Foot foot, double time_s) const {
-    const double generic = GenericAt(time_s);
+  [[nodiscard]] DVec3 PlainBallAt(Foot foot, double time_s, const PostureSample& stride) const {
     const auto f = Index(foot);
     const double share = foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s);
     const double stand_y = person_.stand.balls_m[f].y;
-    DVec3 ball(0.0, stand_y + share * (stride_.At(generic).balls_m[f].y - stand_y), 0.0);
+    DVec3 ball(0.0, stand_y + share * (stride.balls_m[f].y - stand_y), 0.0);
     if (foot == fixed_) return ball;
-    const double swing = SwingAt(generic);
     const DVec3 end = RotateYaw(feet_.turn_rad, feet_.end_m);
-    const DVec3 place = feet_.start_m + SmootherStep(swing) * (end - feet_.start_m);
+    const DVec3 place =
+        feet_.start_m + SmootherStep(SwingAt(GenericAt(time_s))) * (end - feet_.start_m);
+    ball.x = place.x;
+    ball.z = place.z;
+    return ball;
+  }
+  [[nodiscard]] DVec3 BallAt(Foot foot, const Moment& moment) const {
+    DVec3 ball = moment.legs[Index(foot)].ball_m;
+    if (foot == fixed_) return ball;
+    const double bump = Bump(SwingAt(moment.generic));
     const DVec3 outward = RotateYaw(0.5 * feet_.turn_rad, DVec3(SideSign(moving_), 0.0, 0.0));
-    ball.x = place.x + detour_m_ * Bump(swing) * outward.x;
-    ball.z = place.z + detour_m_ * Bump(swing) * outward.z;
-    ball.y += lift_m_ * Bump(swing);
+    ball.x += detour_m_ * bump * outward.x;
+    ball.z += detour_m_ * bump * outward.z;
+    ball.y += lift_m_ * bump;
     return ball;
   }
 
@@ -229,18 +290,16 @@ class StepGenerator {
     if (foot == fixed_) return 0.0;
     return feet_.turn_rad * SmootherStep((SwingAt(GenericAt(time_s)) - 0.08) / 0.84);
   }
-  [[nodiscard]] DQuat AnkleRotationAt(Foot foot, double time_s) const {
+  [[nodiscard]] DQuat AnkleRotationAt(Foot foot, double time_s, const PostureSample& stride) const {
     const double share = foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s);
     const auto f = Index(foot);
     return DQuat(YawRotation(FootYawAt(foot, time_s))) *
-           Blend(person_.stand.ankles[f], stride_.At(GenericAt(time_s)).ankles[f],
-                 std::min(1.0, share));
+           Blend(person_.stand.ankles[f], stride.ankles[f], std::min(1.0, share));
   }
 
   // Rotations of all joints before inverse kinematics, with the root at the origin.
-  [[nodiscard]] Pose PostureAt(double time_s) const {
+  [[nodiscard]] Pose PostureAt(double time_s, const PostureSample& stride) const {
     const double share = std::min(1.0, ShareAt(time_s));
-    const PostureSample stride = stride_.At(GenericAt(time_s));
     PostureSample sample = Blend(person_.stand, stride, share);
     // The legs get more of the captured swing, so that they bend in the plane of the capture.
     const double leg_share = std::min(1.0, SwingShareAt(time_s));
@@ -270,35 +329,25 @@ class StepGenerator {
   }
 
   struct LegTarget {
-    LegPose leg;
     DVec3 ankle_m = DVec3(0.0);  // Relative to the fixed ball.
-    DQuat rotation;
     DVec3 tip_m = DVec3(0.0);
     DVec3 heel_m = DVec3(0.0);
   };
 
-  [[nodiscard]] LegTarget TargetAt(Foot foot, double time_s, const Pose& posture) const {
+  [[nodiscard]] LegTarget TargetAt(Foot foot, const Moment& moment) const {
+    const Leg& leg = moment.legs[Index(foot)];
     LegTarget target;
-    const LegRig::Side& side = person_.rig.side(foot);
-    EvaluateLeg(person_.skeleton, person_.rig, posture, foot, target.leg);
-    target.rotation = AnkleRotationAt(foot, time_s);
-    const auto ankle = static_cast<std::size_t>(side.ankle);
-    const auto turned = [&](const Vec3& point) {
-      return target.rotation * (glm::conjugate(DQuat(target.leg.world_rotations[ankle])) *
-                                DVec3(point - target.leg.positions_m[ankle]));
-    };
-    target.ankle_m = BallAt(foot, time_s) - turned(target.leg.ball_m);
-    target.tip_m = target.ankle_m + turned(target.leg.toe_tip_m);
-    target.heel_m = target.ankle_m + target.rotation * DVec3(side.heel_m);
+    target.ankle_m = BallAt(foot, moment) - leg.ankle_to_ball;
+    target.tip_m = target.ankle_m + leg.ankle_to_tip;
+    target.heel_m = target.ankle_m + leg.ankle_to_heel;
     return target;
   }
 
   // Returns the distance between the swinging and the fixed foot, from heel to toe tip, seen from
   // above.
-  [[nodiscard]] double FeetApart(double time_s) const {
-    const Pose posture = PostureAt(time_s);
-    const LegTarget swinging = TargetAt(moving_, time_s, posture);
-    const LegTarget still = TargetAt(fixed_, time_s, posture);
+  [[nodiscard]] double FeetApart(const Moment& moment) const {
+    const LegTarget swinging = TargetAt(moving_, moment);
+    const LegTarget still = TargetAt(fixed_, moment);
     double nearest = kDetours.max_m;
     for (int i = 0; i <= 4; ++i) {
       for (int k = 0; k <= 4; ++k) {
@@ -310,78 +359,84 @@ class StepGenerator {
     return nearest;
   }
 
-  [[nodiscard]] double SwingTime(double part) const {
-    return toe_off_s_ + part * (strike_s_ - toe_off_s_);
-  }
-
-  [[nodiscard]] double NearestApproach() const {
-    double nearest = kDetours.max_m;
-    for (int i = 1; i < 10; ++i) nearest = std::min(nearest, FeetApart(SwingTime(0.1 * i)));
-    return nearest;
+  [[nodiscard]] Moment MomentOfSwing(double part) const {
+    return MomentAt(toe_off_s_ + part * (strike_s_ - toe_off_s_));
   }
 
   // Leads the swinging foot around the fixed one if the step turns, and raises it until it is clear
   // of the ground.
   void PlanSwing() {
-    if (feet_.turn_rad != 0.0) {
-      detour_m_ = builtin::FindDetour(kDetours, [&](double detour_m) {
-        detour_m_ = detour_m;
-        return NearestApproach();
-      });
-    }
+    if (feet_.turn_rad != 0.0) PlanDetour();
     const LegRig::Side& side = person_.rig.side(moving_);
     const double ball_y = person_.stand.balls_m[Index(moving_)].y;
-    const auto is_clear = [&] {
-      for (int i = 4; i <= 17; ++i) {
-        const double part = 0.05 * i;
-        const double time_s = SwingTime(part);
-        const LegTarget target = TargetAt(moving_, time_s, PostureAt(time_s));
-        if (BallAt(moving_, time_s).y < ball_y + (part < 0.3 ? 0.0 : kClearanceM)) return false;
-        if (target.tip_m.y < side.toe_height_m + (part < 0.3 ? 0.0 : kTipClearanceM)) return false;
-      }
-      return true;
+    struct Check {
+      Moment moment;
+      double ball_m;  // Least height of the ball.
+      double tip_m;   // Least height of the tip of the toes.
     };
-    while (!is_clear() && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
+    std::vector<Check> checks;
+    for (int i = 4; i <= 17; ++i) {
+      const double part = 0.05 * i;
+      const bool is_early = part < 0.3;
+      checks.push_back({MomentOfSwing(part), ball_y + (is_early ? 0.0 : kClearanceM),
+                        side.toe_height_m + (is_early ? 0.0 : kTipClearanceM)});
+    }
+    const auto is_clear = [&](const Check& check) {
+      return BallAt(moving_, check.moment).y >= check.ball_m &&
+             TargetAt(moving_, check.moment).tip_m.y >= check.tip_m;
+    };
+    while (!std::ranges::all_of(checks, is_clear) && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
+  }
+
+  void PlanDetour() {
+    std::vector<Moment> moments;
+    for (int i = 1; i < 10; ++i) moments.push_back(MomentOfSwing(0.1 * i));
+    detour_m_ = builtin::FindDetour(kDetours, [&](double detour_m) {
+      detour_m_ = detour_m;
+      double nearest = kDetours.max_m;
+      for (const Moment& moment : moments) nearest = std::min(nearest, FeetApart(moment));
+      return nearest;
+    });
   }
 
   // Returns by how much the root is too high for the legs.
-  [[nodiscard]] double MissingReach(double time_s) const {
-    const Pose posture = PostureAt(time_s);
-    const DVec3 root = RootAt(time_s);
+  [[nodiscard]] double MissingReach(const Moment& moment) const {
     double missing = 0.0;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      const LegTarget target = TargetAt(foot, time_s, posture);
-      const LegRig::Side& side = person_.rig.side(foot);
-      const DVec3 hip = root + DVec3(target.leg.positions_m[static_cast<std::size_t>(side.hip)]);
-      const double reach = ExtensionOf(foot) * (side.thigh_m + side.shank_m);
-      missing = std::max(missing, hip.y - builtin::HighestHipM(hip, target.ankle_m, reach));
+      const DVec3 hip = moment.root_m + moment.legs[Index(foot)].hip_m;
+      const double highest_m =
+          builtin::HighestHipM(hip, TargetAt(foot, moment).ankle_m, reach_m_[Index(foot)]);
+      missing = std::max(missing, hip.y - highest_m);
     }
     return missing;
   }
 
-  // Returns the largest distance from hip to ankle as a fraction of the length of the leg.
-  [[nodiscard]] double ExtensionOf(Foot foot) const {
+  // Returns the largest distance from hip to ankle.
+  [[nodiscard]] double ReachOf(Foot foot) const {
     LegPose leg;
     EvaluateLeg(person_.skeleton, person_.rig, ToPose(person_.stand), foot, leg);
     const LegRig::Side& side = person_.rig.side(foot);
     const Vec3 reach = leg.positions_m[static_cast<std::size_t>(side.ankle)] -
                        leg.positions_m[static_cast<std::size_t>(side.hip)];
     const double standing = glm::length(reach) / (side.thigh_m + side.shank_m);
-    return std::max(kMaxExtension, standing);
+    return std::max(kMaxExtension, standing) * (side.thigh_m + side.shank_m);
   }
 
-  // Returns how far the root is lowered at each frame, so that the legs reach the feet. At both
+  // Returns how far the root is lowered at each moment, so that the legs reach the feet. At both
   // ends it depends only on the state, so that steps join.
-  [[nodiscard]] std::vector<double> Lowering(int frames) const {
+  [[nodiscard]] std::vector<double> Lowering(const std::vector<Moment>& moments) const {
     constexpr int kRounds = 3;
     constexpr int kHalf = 10;
     constexpr double kFramesFromEnds = 8.0;
     std::vector<double> weights;
     for (int k = -kHalf; k <= kHalf; ++k) weights.push_back(1.0 - std::fabs(k) / (kHalf + 1.0));
-    const auto count = static_cast<std::size_t>(frames);
+    const std::size_t count = moments.size();
+    std::vector<double> reach_missing;
+    reach_missing.reserve(count);
+    for (const Moment& moment : moments) reach_missing.push_back(MissingReach(moment));
+    const double first = reach_missing.front();
+    const double last = MissingReach(MomentAt(end_s_));
     std::vector<double> lowered(count, 0.0);
-    const double first = MissingReach(0.0);
-    const double last = MissingReach(end_s_);
     for (std::size_t i = 0; i < count; ++i) {
       const double part = static_cast<double>(i) / static_cast<double>(count - 1);
       lowered[i] = first + (last - first) * SmootherStep(part);
@@ -389,7 +444,7 @@ class StepGenerator {
     std::vector<double> missing(count);
     for (int round = 0; round < kRounds; ++round) {
       for (std::size_t i = 0; i < count; ++i) {
-        missing[i] = std::max(0.0, MissingReach(static_cast<double>(i) / kFps) - lowered[i]);
+        missing[i] = std::max(0.0, reach_missing[i] - lowered[i]);
       }
       const std::vector<double> smooth = MovingMean(MovingMaximum(missing, kHalf), weights);
       for (std::size_t i = 0; i < count; ++i) {
@@ -400,14 +455,15 @@ class StepGenerator {
     return lowered;
   }
 
-  [[nodiscard]] Pose PoseAt(double time_s, double lowered_m) const {
-    Pose pose = PostureAt(time_s);
-    DVec3 root = RootAt(time_s);
+  [[nodiscard]] Pose PoseAt(const Moment& moment, double lowered_m) const {
+    Pose pose = moment.posture;
+    DVec3 root = moment.root_m;
     root.y -= lowered_m;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      const LegTarget target = TargetAt(foot, time_s, pose);
-      SolveLeg(person_.rig, foot, target.leg, Vec3(target.ankle_m - root), Quat(target.rotation),
-               pose);
+      LegPose leg;
+      EvaluateLeg(person_.skeleton, person_.rig, pose, foot, leg);
+      SolveLeg(person_.rig, foot, leg, Vec3(TargetAt(foot, moment).ankle_m - root),
+               Quat(moment.legs[Index(foot)].ankle_rotation), pose);
     }
     pose.root_position_m = Vec3(root);
     return pose;
@@ -423,8 +479,9 @@ class StepGenerator {
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;
   double end_s_ = 0.0;
-  HermiteCurve captured_;  // Begins and ends like the root of the captured stride.
-  HermiteCurve root_;      // Begins and ends like the root of the generated step.
+  std::array<double, 2> reach_m_{};  // [Foot]: largest distance from hip to ankle.
+  HermiteCurve captured_;            // Begins and ends like the root of the captured stride.
+  HermiteCurve root_;                // Begins and ends like the root of the generated step.
   double detour_m_ = 0.0;
   double lift_m_ = 0.0;
 };
