@@ -89,22 +89,26 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
     cells[i] = cells_at(length.mean_s, fps);
     most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
   }
+  // Cells are only ever added, so an example whose error is small is not measured again.
+  std::vector<const RawExample*> rough;
+  for (const RawExample& example : group.examples) rough.push_back(&example);
   for (int round = 0; round < kMaxRounds; ++round) {
     // If the mean error of an example is too large, add cells to those of its intervals whose error
     // is above the mean.
     std::vector<bool> grows(intervals, false);
-    for (const RawExample& example : group.examples) {
-      const std::vector<double> errors = StoredErrors(example, cells, layout, stand_root);
-      const std::vector<double>& keys = example.keytimes_s;
+    std::erase_if(rough, [&](const RawExample* example) {
+      const std::vector<double> errors = StoredErrors(*example, cells, layout, stand_root);
+      const std::vector<double>& keys = example->keytimes_s;
       double mean = 0.0;
       for (std::size_t i = 0; i < intervals; ++i) {
         mean += errors[i] * (keys[i + 1] - keys[i]) / keys.back();
       }
-      if (mean <= kStoredErrorRad) continue;
+      if (mean <= kStoredErrorRad) return true;
       for (std::size_t i = 0; i < intervals; ++i) {
         if (errors[i] >= mean) grows[i] = true;
       }
-    }
+      return false;
+    });
     bool changed = false;
     for (std::size_t i = 0; i < intervals; ++i) {
       if (!grows[i] || cells[i] == most[i]) continue;

@@ -77,7 +77,12 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   if (content.groups.empty()) {
     return Fail(ErrorCode::kOutOfRange, "there are no examples to build a library from");
   }
-  Builder builder(1 << 20);
+  // Nearly all of a library are its grids. Growing the buffer would copy them several times.
+  std::size_t size_estimate = 1 << 18;
+  for (const MotionGroup& group : content.groups) {
+    size_estimate += group.grid.size() * sizeof(group.grid.front());
+  }
+  Builder builder(size_estimate);
   std::vector<flatbuffers::Offset<fb::Group>> groups;
   for (const MotionGroup& group : content.groups) groups.push_back(AddGroup(builder, group));
 
