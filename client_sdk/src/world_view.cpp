@@ -20,11 +20,12 @@ void WorldView::SetInfo(const protocol::WorldInfo& info) {
 
 std::shared_ptr<const protocol::CompactCodecs> WorldView::MakeCodecs(
     const protocol::WorldInfo& info) {
-  if (info.rotation_codes.empty()) return nullptr;
+  if (info.rotation_quantizations.empty()) return nullptr;
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
   // The decoder has checked the codes and parents, so this does not fail.
-  auto codecs = protocol::CompactCodecs::Make(info.rotation_codes, parents, info.reduced_joints);
+  auto codecs =
+      protocol::CompactCodecs::Make(info.rotation_quantizations, parents, info.reduced_joints);
   if (!codecs) return nullptr;
   return std::make_shared<const protocol::CompactCodecs>(*std::move(codecs));
 }

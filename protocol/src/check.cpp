@@ -111,19 +111,21 @@ void CheckMeaning(Findings& found, const FieldPath& at, const SkeletonInfo& m) {
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const WorldInfo& m) {
-  const FieldPath codes = At(at, "rotation_codes");
-  found.That(m.rotation_codes.empty() || m.rotation_codes.size() == m.skeleton.joints.size(), codes,
-             m.rotation_codes.size(), "expected one code per joint", ErrorCode::kShapeMismatch);
-  if (const Status status = CheckRotationCodes(m.rotation_codes); !status) {
+  const FieldPath codes = At(at, "rotation_quantizations");
+  found.That(m.rotation_quantizations.empty() ||
+                 m.rotation_quantizations.size() == m.skeleton.joints.size(),
+             codes, m.rotation_quantizations.size(), "expected one code per joint",
+             ErrorCode::kShapeMismatch);
+  if (const Status status = CheckRotationQuantizations(m.rotation_quantizations); !status) {
     found.Wrong(status.error().code, status.error().text, codes, status.error().index);
   }
   if (m.reduced_joints.empty()) return;
   std::vector<std::int16_t> parents;
   for (const JointInfo& joint : m.skeleton.joints) parents.push_back(joint.parent);
   // Reduced joints are allowed only if there are rotation codes.
-  if (m.rotation_codes.empty()) parents.clear();
+  if (m.rotation_quantizations.empty()) parents.clear();
   if (const Status status = CheckReducedJoints(m.reduced_joints, parents); !status) {
-    found.Wrong(status.error().code, status.error().text, At(at, "fewer_joints"),
+    found.Wrong(status.error().code, status.error().text, At(at, "reduced_joints"),
                 status.error().index);
   }
 }

@@ -128,7 +128,7 @@ std::vector<std::uint16_t> ByDepth(std::span<const std::int16_t> parents) {
 
 }  // namespace
 
-Status CheckRotationCodes(std::span<const RotationQuantization> codes) {
+Status CheckRotationQuantizations(std::span<const RotationQuantization> codes) {
   const auto wrong = [](ErrorCode code, const char* text, std::size_t joint) {
     return Fail(code, text, static_cast<std::int64_t>(joint));
   };
@@ -140,10 +140,11 @@ Status CheckRotationCodes(std::span<const RotationQuantization> codes) {
     if (code.smallest_three_bits != 0) {
       if (code.smallest_three_bits < RotationQuantization::kMinFreeBits ||
           code.smallest_three_bits > RotationQuantization::kMaxFreeBits) {
-        return wrong(ErrorCode::kOutOfRange, "free_bits is neither 0 nor from 8 to 15", j);
+        return wrong(ErrorCode::kOutOfRange, "smallest_three_bits is neither 0 nor from 8 to 15",
+                     j);
       }
     } else if (j == 0) {
-      return wrong(ErrorCode::kMalformed, "free_bits of the root is 0", j);
+      return wrong(ErrorCode::kMalformed, "smallest_three_bits of the root is 0", j);
     }
     const float squared = Dot(code.reference, code.reference);
     if (!(std::abs(squared - 1.0f) <= 1e-5f)) {
@@ -194,7 +195,7 @@ Status CheckReducedJoints(std::span<const std::uint16_t> joints,
 Expected<CompactCodec> CompactCodec::Make(std::span<const RotationQuantization> codes,
                                           std::span<const std::int16_t> parents,
                                           std::span<const std::uint16_t> included) {
-  if (const Status status = CheckRotationCodes(codes); !status) {
+  if (const Status status = CheckRotationQuantizations(codes); !status) {
     return std::unexpected(status.error());
   }
   if (codes.empty() || codes.size() != parents.size()) {

@@ -39,18 +39,18 @@ void CheckFields(Findings& found, const FieldPath& at, const RequestItem& m) {
       m, [&](const char* name, const auto& value) { CheckValue(found, At(at, name), value); });
   const auto* step = std::get_if<StepMovement>(&m.movement);
   found.That(step == nullptr || !step->exact_only || !step->allow_nearest, ErrorCode::kMalformed,
-             "must_be_met excludes allow_nearest", At(at, "must_be_met"));
+             "exact_only excludes allow_nearest", At(at, "exact_only"));
 }
 
 void Unpack(Unpacker& u, const FieldPath& at, const wire::RequestItem& w, RequestItem& m) {
   m.avatar = w.avatar();
   m.request_id = w.request_id();
-  m.interrupt = static_cast<Interrupt>(w.takeover());
+  m.interrupt = static_cast<Interrupt>(w.interrupt());
   switch (w.type()) {
     case wire::MovementType::Step: {
       StepMovement step{.foot = static_cast<FootChoice>(w.foot()),
-                        .exact_only = w.must_be_met(),
-                        .allow_nearest = !w.must_be_met() && !w.must_be_near()};
+                        .exact_only = w.exact_only(),
+                        .allow_nearest = !w.exact_only() && !w.must_be_near()};
       if (const wire::Vec3* place = w.at_m()) {
         Unpack(u, at, *place, step.at.emplace().position_m);
         step.at->heading_rad = w.heading_rad();
@@ -90,7 +90,7 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& m) {
   const auto* walk = std::get_if<WalkMovement>(&m.movement);
   const auto foot = step ? step->foot : FootChoice::kAuto;
   const bool is_placed = step && step->at;
-  // must_be_met includes must_be_near.
+  // exact_only includes must_be_near.
   const bool must_be_near = step   ? !step->exact_only && !step->allow_nearest
                             : jump ? !jump->allow_nearest
                                    : false;
@@ -119,7 +119,7 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& m) {
       b, m.avatar, m.request_id, static_cast<wire::MovementType>(m.movement.index()),
       static_cast<wire::FootChoice>(foot), length_m, side_m, height_m, turn_rad,
       stand ? stand->seconds : 0.0, at ? &*at : nullptr, heading_rad, waypoints,
-      walk ? walk->speed_m_s : std::nullopt, static_cast<wire::Takeover>(m.interrupt),
+      walk ? walk->speed_m_s : std::nullopt, static_cast<wire::Interrupt>(m.interrupt),
       step && step->exact_only, must_be_near);
 }
 

@@ -23,7 +23,7 @@ void VisitRequest(Item& item, const Visit& visit) {
   visit("request_id", item.request_id);
   const auto type = static_cast<MovementType>(item.movement.index());
   visit("type", type);
-  visit("takeover", item.interrupt);
+  visit("interrupt", item.interrupt);
   if (auto* step = std::get_if<StepMovement>(&item.movement)) {
     visit("foot", step->foot);
     if (step->at) {
@@ -31,7 +31,7 @@ void VisitRequest(Item& item, const Visit& visit) {
     } else {
       visit_change(*step);
     }
-    visit("must_be_met", step->exact_only);
+    visit("exact_only", step->exact_only);
   } else if (auto* jump = std::get_if<JumpMovement>(&item.movement)) {
     visit_change(*jump);
   } else if (auto* stand = std::get_if<StandMovement>(&item.movement)) {

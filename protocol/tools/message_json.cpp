@@ -28,7 +28,7 @@ Json Fields(const RotationQuantization& m) {
           {"low", Value(m.low)},
           {"step", Value(m.step)},
           {"bits", m.bits},
-          {"free_bits", m.smallest_three_bits},
+          {"smallest_three_bits", m.smallest_three_bits},
           {"least_w", m.least_w}};
 }
 
@@ -38,7 +38,7 @@ Json Fields(const RequestItem& m) {
   const auto* step = std::get_if<StepMovement>(&m.movement);
   const auto* jump = std::get_if<JumpMovement>(&m.movement);
   // Vectors that are older than these fields do not contain them.
-  if (step != nullptr && !step->at && !step->exact_only) json.erase("must_be_met");
+  if (step != nullptr && !step->at && !step->exact_only) json.erase("exact_only");
   if ((step != nullptr && !step->allow_nearest && !step->exact_only) ||
       (jump != nullptr && !jump->allow_nearest)) {
     json["must_be_near"] = true;
@@ -115,7 +115,7 @@ void FromJson(const Json& json, RotationQuantization& m) {
   Get(json, "low", m.low);
   Get(json, "step", m.step);
   json.at("bits").get_to(m.bits);
-  Get(json, "free_bits", m.smallest_three_bits);
+  Get(json, "smallest_three_bits", m.smallest_three_bits);
   Get(json, "least_w", m.least_w);
 }
 

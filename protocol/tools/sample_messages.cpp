@@ -41,7 +41,7 @@ struct CompactArrays {
     // In this mode a pose contains only its root, which always fits.
     if (mode == PoseMode::kCompactRoot) flags[1] = 0;
     const CompactCodec& codec = *SampleCodecs().Find(mode);
-    const std::vector<RotationQuantization>& codes = SampleWorld().rotation_codes;
+    const std::vector<RotationQuantization>& codes = SampleWorld().rotation_quantizations;
     CompactCodec::Block block;
     for (int a = 0; a < 3; ++a) {
       std::vector<Quat> rotations;
@@ -138,7 +138,7 @@ const CompactCodecs& SampleCodecs() {
     const WorldInfo& world = SampleWorld();
     std::vector<std::int16_t> parents;
     for (const JointInfo& joint : world.skeleton.joints) parents.push_back(joint.parent);
-    return CompactCodecs::Make(world.rotation_codes, parents, world.reduced_joints).value();
+    return CompactCodecs::Make(world.rotation_quantizations, parents, world.reduced_joints).value();
   }();
   return codecs;
 }

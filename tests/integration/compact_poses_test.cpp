@@ -440,7 +440,7 @@ TEST(PoseQuantization, ReportsTheErrorIfBitsRunOut) {
   const PoseQuantization code = ChoosePoseQuantization(skeleton, ranges, kLargestErrorM);
   EXPECT_EQ(code.joints[0].smallest_three_bits, RotationQuantization::kMaxFreeBits);
   EXPECT_GT(code.largest_error_m, kLargestErrorM);
-  EXPECT_TRUE(protocol::CheckRotationCodes(code.joints));
+  EXPECT_TRUE(protocol::CheckRotationQuantizations(code.joints));
 }
 
 }  // namespace

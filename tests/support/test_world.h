@@ -34,7 +34,7 @@ inline protocol::Welcome Welcome(bool resumed = false) {
 }
 
 /// Hips and head rotate about any axis, the spine does not rotate.
-inline std::vector<RotationQuantization> RotationCodes() {
+inline std::vector<RotationQuantization> RotationQuantizations() {
   std::vector<RotationQuantization> codes(kJoints);
   codes[0].smallest_three_bits = 12;
   codes[1].step = Vec3(0.02f);
@@ -44,8 +44,8 @@ inline std::vector<RotationQuantization> RotationCodes() {
 /// With reduced joints, the rotation of the head is omitted.
 inline std::vector<std::uint16_t> FewerJoints() { return {0, 1}; }
 inline protocol::CompactCodecs Codecs() {
-  return protocol::CompactCodecs::Make(RotationCodes(), std::array<std::int16_t, kJoints>{-1, 0, 1},
-                                       FewerJoints())
+  return protocol::CompactCodecs::Make(RotationQuantizations(),
+                                       std::array<std::int16_t, kJoints>{-1, 0, 1}, FewerJoints())
       .value();
 }
 
@@ -60,7 +60,7 @@ inline protocol::WorldInfo WorldInfo(protocol::Seq seq, protocol::WorldId world,
                           {"spine", 0, Vec3(0.0f, 0.2f, 0.0f)},
                           {"head", 1, Vec3(0.0f, 0.4f, 0.0f)}};
   info.skeleton.end_sites = {{2, Vec3(0.0f, 0.1f, 0.0f)}};
-  info.rotation_codes = RotationCodes();
+  info.rotation_quantizations = RotationQuantizations();
   info.reduced_joints = FewerJoints();
   return info;
 }

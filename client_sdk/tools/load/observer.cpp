@@ -108,7 +108,8 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
   if (protocol::IsCompact(SentMode())) {
     std::vector<std::int16_t> parents;
     for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
-    auto codecs = protocol::CompactCodecs::Make(info.rotation_codes, parents, info.reduced_joints);
+    auto codecs =
+        protocol::CompactCodecs::Make(info.rotation_quantizations, parents, info.reduced_joints);
     const protocol::CompactCodec* codec = codecs ? codecs->Find(SentMode()) : nullptr;
     if (codec == nullptr) return Lose("WorldInfo has no rotation codes");
     world.max_pose_bytes = std::max(world.max_pose_bytes, codec->pose_bytes());

@@ -64,7 +64,7 @@ protocol::WorldInfo DescribeWorld(const MotionLibrary& library) {
     info.skeleton.joints.push_back(
         {joint.name, static_cast<std::int16_t>(joint.parent), joint.offset_m});
   }
-  info.rotation_codes = ChoosePoseQuantization(library).joints;
+  info.rotation_quantizations = ChoosePoseQuantization(library).joints;
   info.reduced_joints = ChooseReducedJoints(library);
   return info;
 }

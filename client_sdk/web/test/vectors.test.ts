@@ -90,7 +90,7 @@ test('sets joints that a detail leaves out to their references', () => {
       [['pose_batch_fewer', info.reducedJoints], ['pose_batch_root', [0]]];
   for (const [name, joints] of batches) {
     const rotations = read(name);
-    info.rotationCodes.forEach(({reference}, j) => {
+    info.rotationQuantizations.forEach(({reference}, j) => {
       const expected =
           joints.includes(j) ? all.subarray(4 * j, 4 * j + 4) : Float32Array.from(reference);
       assert.deepEqual(rotations.subarray(4 * j, 4 * j + 4), expected, `${name}, joint ${j}`);

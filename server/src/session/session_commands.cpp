@@ -287,7 +287,7 @@ void SessionCommands::SendWorldInfo(Seq seq, const Membership& membership) {
                                     .library_hash = world.library->hash(),
                                     .skeleton = ToWire(world.library->skeleton()),
                                     .layers = std::move(layers),
-                                    .rotation_codes = world.quantizations->joints,
+                                    .rotation_quantizations = world.quantizations->joints,
                                     .reduced_joints = world.quantizations->reduced_joints});
 }
 

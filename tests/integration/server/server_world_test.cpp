@@ -278,7 +278,8 @@ TEST(ServerWorld, SendsPosesInTheRequestedDetail) {
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
   const auto codecs =
-      protocol::CompactCodecs::Make(world->rotation_codes, parents, world->reduced_joints).value();
+      protocol::CompactCodecs::Make(world->rotation_quantizations, parents, world->reduced_joints)
+          .value();
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   ASSERT_TRUE(client.Request(world->world, Steps(1, 40, 0.6)));
   constexpr std::array kDetails{PoseDetail::kAll, PoseDetail::kReduced, PoseDetail::kRoot};
@@ -314,7 +315,7 @@ TEST(ServerWorld, SendsPosesInTheRequestedDetail) {
     for (std::size_t j = 0; j < parents.size(); ++j) {
       const bool is_included =
           std::ranges::binary_search(world->reduced_joints, static_cast<std::uint16_t>(j));
-      const Quat& reference = world->rotation_codes[j].reference;
+      const Quat& reference = world->rotation_quantizations[j].reference;
       const Quat& all = modes.at(PoseMode::kCompact)[j];
       EXPECT_EQ(modes.at(PoseMode::kCompactReduced)[j], is_included ? all : reference) << j;
       EXPECT_EQ(modes.at(PoseMode::kCompactRoot)[j], j == 0 ? all : reference) << j;
@@ -331,10 +332,10 @@ TEST(ServerWorld, SendsQuantisedPosesInCompactMode) {
   ASSERT_TRUE(quantised.SayHello() && full.SayHello());
   const auto world = quantised.Join("w");
   ASSERT_TRUE(world && full.Join("w", protocol::Role::kObserver));
-  ASSERT_EQ(world->rotation_codes.size(), world->skeleton.joints.size());
+  ASSERT_EQ(world->rotation_quantizations.size(), world->skeleton.joints.size());
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
-  const auto codec = protocol::CompactCodec::Make(world->rotation_codes, parents).value();
+  const auto codec = protocol::CompactCodec::Make(world->rotation_quantizations, parents).value();
   ASSERT_LT(codec.pose_bytes(), protocol::PoseBytes(PoseMode::kQuantised, parents.size()));
 
   ASSERT_TRUE(quantised.Spawn(world->world, {{.avatar = 1}}));

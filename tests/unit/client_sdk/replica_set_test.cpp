@@ -229,7 +229,7 @@ TEST(WorldView, RecordsEvaluatedPoses) {
   for (const bool is_compact : {true, false}) {
     Server server(kAvatars);
     protocol::WorldInfo info = DescribeWorld(*server.library());
-    if (is_compact) info.rotation_codes = ChoosePoseQuantization(*server.library()).joints;
+    if (is_compact) info.rotation_quantizations = ChoosePoseQuantization(*server.library()).joints;
     PoseBudget budget{std::size_t{1} << 30, 0};
     WorldView view(512, budget, PoseRecording(1e9, std::size_t{1} << 30));
     view.SetInfo(info);

@@ -257,7 +257,7 @@ TEST_F(WorldViewTest, CompactPosesEqualFullPoses) {
   }
   // Compact poses of a world without codes are an error.
   protocol::WorldInfo uncoded = test_world::WorldInfo(1, 1, "plaza");
-  uncoded.rotation_codes.clear();
+  uncoded.rotation_quantizations.clear();
   uncoded.reduced_joints.clear();
   view_.SetInfo(uncoded);
   const Status status = view_.Apply(batch, 1, counts_);

@@ -381,36 +381,36 @@ TEST(Check, WorldInfo) {
       good, [&](W& m) { m.skeleton.legs[1].toe_tip_offset_m.x = nan; }, ErrorCode::kOutOfRange,
       "WorldInfo.skeleton.right_leg.toe_tip_offset_m");
   W with_codes = good;
-  with_codes.rotation_codes.resize(good.skeleton.joints.size());
-  with_codes.rotation_codes[0].smallest_three_bits = 12;
+  with_codes.rotation_quantizations.resize(good.skeleton.joints.size());
+  with_codes.rotation_quantizations[0].smallest_three_bits = 12;
   ASSERT_TRUE(Check(with_codes));
   Refused<W>(
-      with_codes, [](W& m) { m.rotation_codes.pop_back(); }, ErrorCode::kShapeMismatch,
-      "WorldInfo.rotation_codes");
+      with_codes, [](W& m) { m.rotation_quantizations.pop_back(); }, ErrorCode::kShapeMismatch,
+      "WorldInfo.rotation_quantizations");
   Refused<W>(
-      with_codes, [&](W& m) { m.rotation_codes[1].step.y = nan; }, ErrorCode::kOutOfRange,
-      "WorldInfo.rotation_codes.step", 1);
+      with_codes, [&](W& m) { m.rotation_quantizations[1].step.y = nan; }, ErrorCode::kOutOfRange,
+      "WorldInfo.rotation_quantizations.step", 1);
   Refused<W>(
-      with_codes, [](W& m) { m.rotation_codes[0].smallest_three_bits = 0; }, ErrorCode::kMalformed,
-      "WorldInfo.rotation_codes", 0);
+      with_codes, [](W& m) { m.rotation_quantizations[0].smallest_three_bits = 0; },
+      ErrorCode::kMalformed, "WorldInfo.rotation_quantizations", 0);
   Refused<W>(
-      with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kLimitExceeded,
-      "WorldInfo.rotation_codes");
+      with_codes, [](W& m) { m.rotation_quantizations.resize(kMaxJoints + 1); },
+      ErrorCode::kLimitExceeded, "WorldInfo.rotation_quantizations");
   W with_fewer = with_codes;
   with_fewer.reduced_joints = {0, 1};
   EXPECT_TRUE(Check(with_fewer));
   Refused<W>(
-      with_fewer, [](W& m) { m.rotation_codes.clear(); }, ErrorCode::kShapeMismatch,
-      "WorldInfo.fewer_joints");
+      with_fewer, [](W& m) { m.rotation_quantizations.clear(); }, ErrorCode::kShapeMismatch,
+      "WorldInfo.reduced_joints");
   Refused<W>(
       with_fewer, [](W& m) { m.reduced_joints.resize(m.skeleton.joints.size() + 1); },
-      ErrorCode::kShapeMismatch, "WorldInfo.fewer_joints");
+      ErrorCode::kShapeMismatch, "WorldInfo.reduced_joints");
   const auto last = static_cast<std::uint16_t>(good.skeleton.joints.size());
   for (const std::vector<std::uint16_t>& wrong :
        {std::vector<std::uint16_t>{1}, {0, 0}, {0, last}, {0, 1, 1}}) {
     Refused<W>(
         with_fewer, [&](W& m) { m.reduced_joints = wrong; }, ErrorCode::kMalformed,
-        "WorldInfo.fewer_joints");
+        "WorldInfo.reduced_joints");
   }
 }
 
@@ -532,8 +532,8 @@ TEST(Check, ExactOnlyExcludesAllowNearest) {
   const Status status = Check(message);
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
-  EXPECT_EQ(status.error().where, "Request.items.must_be_met");
-  EXPECT_STREQ(status.error().text, "must_be_met excludes allow_nearest");
+  EXPECT_EQ(status.error().where, "Request.items.exact_only");
+  EXPECT_STREQ(status.error().text, "exact_only excludes allow_nearest");
   step.exact_only = false;
   EXPECT_TRUE(Check(message).has_value());
 }

@@ -25,20 +25,20 @@ function parameters(set: Parameters): Json {
 function request(item: QueuedRequest): Json {
   const type = enums.MovementType.indexOf(item.type);
   const common = {avatar: item.avatar, request_id: u64(item.requestId), type,
-    takeover: enums.Takeover.indexOf(item.interrupt)};
+    interrupt: enums.Interrupt.indexOf(item.interrupt)};
   const near = item.allowNearest || item.exactOnly ? {} : {must_be_near: true};
   switch (item.type) {
     case 'step':
       if (item.atM !== null) {
         return {
           ...common, foot: enums.FootChoice.indexOf(item.foot), at_m: vec3(item.atM),
-          heading_rad: item.headingRad, must_be_met: item.exactOnly, ...near,
+          heading_rad: item.headingRad, exact_only: item.exactOnly, ...near,
         };
       }
       return {
         ...common, foot: enums.FootChoice.indexOf(item.foot), length_m: item.lengthM,
         side_m: item.sideM, height_m: item.heightM, turn_rad: item.turnRad,
-        ...(item.exactOnly ? {must_be_met: true} : {}), ...near,
+        ...(item.exactOnly ? {exact_only: true} : {}), ...near,
       };
     case 'jump':
       return {
@@ -171,12 +171,12 @@ export function toJson(m: Message, frame: ArrayBuffer): {[name: string]: Json} {
           left_leg: leg(m.skeleton.leftLeg), right_leg: leg(m.skeleton.rightLeg),
         },
         layers: [...m.layers],
-        rotation_codes: m.rotationCodes.map((code) => ({
+        rotation_quantizations: m.rotationQuantizations.map((code) => ({
           reference: [...code.reference], low: vec3(code.low), step: vec3(code.step),
-          bits: [code.bitsX, code.bitsY, code.bitsZ], free_bits: code.smallestThreeBits,
+          bits: [code.bitsX, code.bitsY, code.bitsZ], smallest_three_bits: code.smallestThreeBits,
           least_w: code.leastW,
         })),
-        ...(m.reducedJoints.length === 0 ? {} : {fewer_joints: [...m.reducedJoints]}),
+        ...(m.reducedJoints.length === 0 ? {} : {reduced_joints: [...m.reducedJoints]}),
       };
     case 'Reply':
       return {
@@ -238,12 +238,12 @@ export function toJson(m: Message, frame: ArrayBuffer): {[name: string]: Json} {
       return {
         seq: u64(m.seq), world: m.world,
         items: m.items.map((item) => ({
-          avatar: item.avatar, layer: item.layer, off: item.fadeOut, weight: item.weight,
+          avatar: item.avatar, layer: item.layer, fade_out: item.fadeOut, weight: item.weight,
           blend_s: item.blendS, speed: item.speed,
         })),
       };
     case 'SetPlanting':
-      return {seq: u64(m.seq), world: m.world, avatars: [...m.avatars], off: !m.enabled};
+      return {seq: u64(m.seq), world: m.world, avatars: [...m.avatars], disabled: !m.enabled};
     case 'WorldTerrain': return {world: m.world, terrain: terrain(m.terrain)};
     case 'AvatarState': {
       const state = m;
@@ -253,7 +253,7 @@ export function toJson(m: Message, frame: ArrayBuffer): {[name: string]: Json} {
         base_position_m: vec3(state.basePositionM), base_heading_rad: state.baseHeadingRad,
         movement: state.movement === null ? null : movement(state.movement),
         queue_size: state.queueSize, queue: state.queue.map(request),
-        planting_off: !state.plantingEnabled,
+        planting_disabled: !state.plantingEnabled,
         layers: state.layers.map((l) => ({
           layer: l.layer, weight: l.weight, time_s: l.timeS, speed: l.speed, ending: l.ending})),
       };

@@ -14,7 +14,7 @@ namespace stridewire::protocol {
 /// Checks the rotation codes of a WorldInfo: references are unit quaternions, numbers are finite
 /// and within the limits of RotationQuantization, and the root uses "smallest three". An empty list
 /// is valid. Fails with kOutOfRange, kMalformed or kLimitExceeded; `index` is the joint.
-[[nodiscard]] Status CheckRotationCodes(std::span<const RotationQuantization> codes);
+[[nodiscard]] Status CheckRotationQuantizations(std::span<const RotationQuantization> codes);
 
 /// Checks the joints of PoseDetail::kReduced: ascending, with the root and the parent of every
 /// joint. Fails with kShapeMismatch if there are more than `parents`, and with kMalformed; `index`
@@ -65,8 +65,8 @@ class CompactCodec {
 
   /// `parents` has one entry per joint: -1 for the root, else below the joint's own index. A pose
   /// contains the joints in `included`, or all joints if it is empty. Fails with the errors of
-  /// CheckRotationCodes and CheckReducedJoints, with kShapeMismatch if the lists differ in length,
-  /// and with kOutOfRange for an invalid parent.
+  /// CheckRotationQuantizations and CheckReducedJoints, with kShapeMismatch if the lists differ in
+  /// length, and with kOutOfRange for an invalid parent.
   [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationQuantization> codes,
                                                    std::span<const std::int16_t> parents,
                                                    std::span<const std::uint16_t> included = {});
