@@ -255,6 +255,44 @@ TEST(TransitionPath, RejectsDistantTransitions) {
             "jump stand step_left +step_right");
 }
 
+// Two groups of left steps. The one that suits long steps begins either with the feet together or
+// with the hips 0.4 m too high, so that its steps cannot follow a stride. Those of the other group
+// can, although they are shorter.
+TEST(TransitionPath, UsesAnotherGroupIfTheBestOneCannotFollow) {
+  RawLibrary raw = MakeTestRawLibrary();
+  RawGroup distant = raw.groups[kLeft];
+  for (RawExample& step : distant.examples) {
+    const float lift_m = step.parameters[0] == 0.0 ? 0.1f : 0.4f;
+    for (Vec3& root_m : step.clip.root_positions_m) root_m.y += lift_m;
+  }
+  const auto keep = [&](std::size_t group, auto is_kept) {
+    std::erase_if(raw.groups[group].examples, [&](const RawExample& step) {
+      return !is_kept(-step.parameters[0], step.parameters[1]);
+    });
+  };
+  keep(kLeft, [](double l0, double l1) { return l0 >= 0.4 && (l1 == 0.2 || l1 == 0.4); });
+  keep(kRight, [](double, double l1) { return l1 >= 0.4; });
+  raw.groups.push_back(std::move(distant));
+  const auto library = std::shared_ptr(LibraryBuilder().Build(raw).value());
+  constexpr std::size_t kDistant = 3;
+  ASSERT_GT(DistanceM(*library, kRight, kDistant), 0.15f);
+  ASSERT_LT(DistanceM(*library, kRight, kLeft), 0.05f);
+
+  StepRequest step{.length_m = 0.6};
+  step.allow_nearest = true;
+  AvatarSimulation avatar(library, BaseFrame{});
+  for (std::uint64_t id = 1; id <= 3; ++id) ASSERT_TRUE(avatar.Enqueue({id, step}).has_value());
+  std::vector<int> groups;
+  for (int tick = 0; tick < 600 && groups.size() < 3; ++tick) {
+    avatar.Advance(1.0 / 60.0);
+    for (const AvatarEvent& event : avatar.events()) {
+      ASSERT_NE(event.type, AvatarEventType::kRejected) << event.reason;
+      if (event.type == AvatarEventType::kStarted) groups.push_back(event.group);
+    }
+  }
+  EXPECT_EQ(groups, (std::vector<int>{kDistant, kRight, kLeft}));
+}
+
 // Without a table, only the positions of the feet matter.
 TEST(TransitionPath, UsesFootPositionsWithoutATable) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });

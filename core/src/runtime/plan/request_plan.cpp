@@ -7,6 +7,7 @@
 #include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
 #include "runtime/library/convex_hull.h"
+#include "runtime/library/transition.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "runtime/weights/measure.h"
 
@@ -61,6 +62,13 @@ constexpr double kHeightWeight = 4.0;
 constexpr double kClimbWeight = 0.5;
 constexpr double kMaxClimbMissM = 0.16;
 constexpr double kChangeM = 1e-6;
+
+// Captured movements that fit together have a transition distance of up to 0.125 m. A stride and a
+// movement that begins with the feet together are more than 0.2 m apart. In some captures no
+// movement begins close to the stand pose, so the limit also grows with the distance from the
+// stand.
+constexpr float kMaxTransitionM = 0.15f;
+constexpr float kMaxTransitionOfStand = 1.5f;
 
 // Requested value of one parameter. If `given` is false, any value within the range of the examples
 // is acceptable.
@@ -205,14 +213,14 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
 
 std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind kind,
                                     const ParameterGoals& goals, double stand_side_m,
-                                    bool is_straight) {
+                                    bool is_straight, std::optional<std::size_t> after) {
   std::optional<RequestPlan> best;
   double best_cost_m = HUGE_VAL;
   const bool is_completed_library =
       IsStep(kind) && std::ranges::any_of(library.groups(), &MotionGroup::is_completed);
   for (std::size_t g = 0; g < library.groups().size(); ++g) {
     const MotionGroup& group = library.groups()[g];
-    if (group.kind != kind) continue;
+    if (group.kind != kind || (after && !MayFollow(library, *after, g))) continue;
     double group_cost_m = kCostPerParameterM * group.parameter_count();
     if (is_straight && IsGeneral(group)) group_cost_m += kStraightPreferenceM;
     if (group.is_completed) group_cost_m += kCompletedCostM;
@@ -242,7 +250,8 @@ double HorizontalMissM(const MotionGroup& group, const RequestPlan& plan) {
 // See PlanStep. `climb_weight` is the weight of heights at the start and end of climbing steps.
 std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary& library,
                                         const StepRequest& request, const FootState& feet,
-                                        Foot last_moved, bool standing) {
+                                        Foot last_moved, bool standing,
+                                        std::optional<std::size_t> after) {
   const FootState stand{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)};
   const auto plan_foot = [&](Foot foot) {
     const DVec3 start = feet.Vector(foot);
@@ -265,7 +274,7 @@ std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary
                                        : request.turn_rad == 0.0 ? kStraightMetresPerRadian
                                                                  : kMetresPerRadian};
     const bool is_straight = request.turn_rad == 0.0 && request.height_m == 0.0 && !request.side_m;
-    auto plan = BestPlan(library, StepKind(foot), goals, stand.Vector(foot).x, is_straight);
+    auto plan = BestPlan(library, StepKind(foot), goals, stand.Vector(foot).x, is_straight, after);
     if (plan) {
       plan->is_side_given = request.side_m.has_value();
       plan->turn_rad = request.turn_rad;
@@ -288,8 +297,18 @@ std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary
 }  // namespace
 
 std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequest& request,
-                                    const FootState& feet, Foot last_moved, bool standing) {
-  return PlanStepWith(kHeightWeight, library, request, feet, last_moved, standing);
+                                    const FootState& feet, Foot last_moved, bool standing,
+                                    std::optional<std::size_t> after) {
+  return PlanStepWith(kHeightWeight, library, request, feet, last_moved, standing, after);
+}
+
+bool MayFollow(const MotionLibrary& library, std::size_t from, std::size_t to) {
+  const std::size_t stand = library.groups().size();
+  const Transition* transition = library.FindTransition(from, to);
+  if (transition == nullptr || from == stand) return true;
+  return transition->distance_m <=
+         std::max(kMaxTransitionM,
+                  kMaxTransitionOfStand * library.FindTransition(stand, to)->distance_m);
 }
 
 std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
@@ -307,7 +326,7 @@ std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot
   std::optional<RequestPlan> plan = PlanStep(library, step, feet, OtherFoot(foot), false);
   if (plan && use == FootprintUse::kRequested &&
       HorizontalMissM(library.group(plan->group), *plan) > kMaxClimbMissM) {
-    plan = PlanStepWith(kClimbWeight, library, step, feet, OtherFoot(foot), false);
+    plan = PlanStepWith(kClimbWeight, library, step, feet, OtherFoot(foot), false, std::nullopt);
   }
   if (plan) plan->exact = print;
   return plan;
@@ -319,7 +338,7 @@ std::optional<RequestPlan> PlanJump(const MotionLibrary& library, const JumpRequ
   At(goals, ParameterName::kHeight) = {request.height_m, true, 1.0};
   At(goals, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
   auto plan = BestPlan(library, MovementKind::kJump, goals, 0.0,
-                       request.turn_rad == 0.0 && request.height_m == 0.0);
+                       request.turn_rad == 0.0 && request.height_m == 0.0, std::nullopt);
   if (plan) {
     plan->target = {.vector_m = {0.0, request.height_m, request.length_m},
                     .turn_rad = request.turn_rad};

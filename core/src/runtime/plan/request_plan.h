@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 
 #include "runtime/movement/movement.h"
@@ -73,10 +74,17 @@ inline constexpr double kHurriedRate = 1.6;
 /// which is given by the feet, has a larger weight than the end. A requested value (turn, side,
 /// height) for which a group has no parameter counts as missed. If the request does not name a
 /// foot, it is the foot other than `last_moved`, unless the avatar is `standing` and `last_moved`
-/// fits better. Returns nullopt if the library has no step of that foot.
+/// fits better. If `after` is given, only groups that may follow that group are considered
+/// (MayFollow). Returns nullopt if the library has no such step of that foot.
 [[nodiscard]] std::optional<RequestPlan> PlanStep(const MotionLibrary& library,
                                                   const StepRequest& request, const FootState& feet,
-                                                  Foot last_moved, bool standing);
+                                                  Foot last_moved, bool standing,
+                                                  std::optional<std::size_t> after = std::nullopt);
+
+/// Returns true if a movement of group `to` may follow one of group `from`: their
+/// Transition::distance_m is at most 0.15 m, or at most 1.5 times the distance of `to` from the
+/// stand. After a stand, whose index is the number of groups, every movement is possible.
+[[nodiscard]] bool MayFollow(const MotionLibrary& library, std::size_t from, std::size_t to);
 
 /// Origin of a footprint: a request, or a walk, which can choose another one if no step fits.
 enum class FootprintUse { kRequested, kWalk };

@@ -6,7 +6,6 @@
 
 #include "base/check.h"
 #include "runtime/library/locomotion_profile.h"
-#include "runtime/library/transition.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {
@@ -14,12 +13,6 @@ namespace {
 
 constexpr double kFeetApartAsideM = 0.3;
 
-// Captured movements that fit together have a transition distance of up to 0.125 m. A stride and a
-// movement that begins with the feet together are more than 0.2 m apart. In some captures no
-// movement begins close to the stand pose, so the limit also grows with the distance from the
-// stand.
-constexpr float kMaxTransitionM = 0.15f;
-constexpr float kMaxTransitionOfStand = 1.5f;
 // Planting can distribute an error of this size over a swing (RequestPlan::most_residual_m).
 constexpr double kMaxStartErrorM = 0.25;
 // An inserted step must reduce the cost of a request by at least this much: kMinStepGainM for
@@ -44,6 +37,7 @@ class TransitionPathFinder {
     const bool can_start = direct && CanStart(*direct, stance);
     const TransitionPath without_insertion{can_start ? direct : std::nullopt};
     if (can_start && !StartsWithFeetApart(*direct, stance)) return without_insertion;
+    if (const auto other = FindOtherGroup(direct, stance)) return {other};
     // If the request can begin now, one inserted step may improve it. If it cannot, insert as many
     // steps as it needs.
     const double max_cost_m = can_start && IsInReach(*direct, stance)
@@ -58,6 +52,23 @@ class TransitionPathFinder {
   }
 
  private:
+  // If the group of a step may not follow the previous movement, returns the best plan in a group
+  // that may. A captured stride and a generated one can differ too much, for example.
+  std::optional<RequestPlan> FindOtherGroup(const std::optional<RequestPlan>& direct,
+                                            const Stance& stance) const {
+    if (step_ == nullptr || !direct ||
+        MayFollow(library_, stance.group, static_cast<std::size_t>(direct->group))) {
+      return std::nullopt;
+    }
+    StepRequest step = *step_;
+    step.foot = MovingFoot(library_.group(direct->group).kind);
+    auto other = PlanStep(library_, step, stance.feet, stance.last_moved, false, stance.group);
+    if (!other || StartsWithFeetApart(*other, stance) || !IsInReach(*other, stance)) {
+      return std::nullopt;
+    }
+    return other;
+  }
+
   // Finds the first of up to `steps` inserted steps after which the request costs at most
   // `max_cost_m`.
   std::optional<RequestPlan> FindFirstStep(int steps, const Stance& stance,
@@ -103,7 +114,7 @@ class TransitionPathFinder {
   }
 
   bool CanStart(const RequestPlan& plan, const Stance& stance) const {
-    return FitsAfter(stance.group, static_cast<std::size_t>(plan.group)) &&
+    return MayFollow(library_, stance.group, static_cast<std::size_t>(plan.group)) &&
            (!StartsWithFeetApart(plan, stance) || StartErrorM(plan, stance) <= kMaxStartErrorM);
   }
 
@@ -113,15 +124,6 @@ class TransitionPathFinder {
     const MovementKind kind = library_.group(plan.group).kind;
     return AreFeetApart(stance.feet, stand_) &&
            (!IsStep(kind) || MovingFoot(kind) == stance.last_moved);
-  }
-
-  bool FitsAfter(std::size_t from, std::size_t to) const {
-    const std::size_t stand = library_.groups().size();
-    const Transition* transition = library_.FindTransition(from, to);
-    if (transition == nullptr || from == stand) return true;
-    return transition->distance_m <=
-           std::max(kMaxTransitionM,
-                    kMaxTransitionOfStand * library_.FindTransition(stand, to)->distance_m);
   }
 
   // Returns the forward distance between the feet and their positions at the start of the

@@ -43,8 +43,9 @@ struct TransitionPath {
 /// brings a foot beside the other one, or as close to it as the library allows. `direct` is the
 /// plan of the request from here.
 ///
-/// - A movement may follow another if their Transition::distance_m is at most 0.15 m, or at most
-///   1.5 times its distance from the stand. After a stand every movement is possible.
+/// - A movement may follow another if MayFollow is true for their groups. If the group that suits a
+///   step best may not follow, the step uses the best group that may, if the request is in reach
+///   with it.
 /// - If the feet are apart, they must come together before a jump, and before a step of the foot
 ///   that moved last. They need not if they are within 0.25 m of their positions in the movement's
 ///   examples. Then a step is inserted only if it brings the feet closer together by 3 cm or
@@ -53,7 +54,7 @@ struct TransitionPath {
 /// - No step is inserted if the request would still be out of reach after it (RequestError). The
 ///   plan of a request that begins at once may be out of reach.
 ///
-/// Breadth-first search with at most 14 calls of PlanStep and 14 more for the request. Never
+/// Breadth-first search with at most 14 calls of PlanStep and 15 more for the request. Never
 /// allocates.
 [[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library,
                                                 const MovementRequest& request,
