@@ -421,7 +421,7 @@ class Planner {
     for (const double part : kSinkSamples) {
       const double time_s =
           trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
-      const double share = 1.0 - EaseOut(time_s / movement_.duration_s());
+      const double share = RootSinkShare(time_s / movement_.duration_s());
       sink_m = std::max(sink_m, MissingReach(time_s) / share);
     }
     return std::min(sink_m, kMaxRootSinkM);

@@ -91,6 +91,8 @@ constexpr double kEasyClimbM = 0.18;
 constexpr double kEasySlopeClimbM = 0.15;
 constexpr float kSlopeNormalY = 0.985f;
 constexpr double kLeastClimbM = 0.05;
+// If that is not possible, steps longer than kLongClimbM end before the edge instead.
+constexpr double kLongClimbM = 0.55;
 constexpr std::array<double, 6> kShorterSteps{0.9, 0.8, 0.7, 0.6, 0.5, 0.4};
 
 // Feet keep this distance from risers in front of their toes and behind their heels, if a shift of
@@ -173,7 +175,7 @@ class StepPlanner {
         const double way = wanted.heading_rad + kAround[static_cast<std::size_t>(i)];
         Footprint print = wanted;
         print.position_m += RotateYaw(way, DVec3(0.0, 0.0, ring_m));
-        print = WithRoom(print);
+        print = WithEasyClimb(WithRoom(print));
         if (!KeepsApart(print) || !IsGood(print)) continue;
         if (auto plan = PlanExactStep(OnGround(print), step)) return plan;
         if (++out_of_reach >= kMaxOutOfReach) return std::nullopt;
@@ -326,7 +328,7 @@ class StepPlanner {
   }
 
   // Returns the footprint, moved back toward the standing foot if the step would climb or descend
-  // too much.
+  // too much, or if it would be long as well.
   Footprint WithEasyClimb(const Footprint& print) const {
     const auto climb_m = [&](const Footprint& at) {
       return terrain_->HeightAt(at.position_m.x, at.position_m.z) - fixed_m_.y;
@@ -335,16 +337,17 @@ class StepPlanner {
     const double easy_m = IsSloped(print) ? kEasySlopeClimbM : kEasyClimbM;
     if (std::fabs(full_m) <= easy_m) return print;
     const double ahead_m = RotateYaw(-print.heading_rad, print.position_m - fixed_m_).z;
+    std::optional<Footprint> before_edge;
     for (const double part : kShorterSteps) {
       Footprint shorter = print;
       shorter.position_m -= RotateYaw(print.heading_rad, DVec3(0.0, 0.0, (1.0 - part) * ahead_m));
       shorter = WithRoom(shorter);
       const double part_m = climb_m(shorter) * (full_m > 0.0 ? 1.0 : -1.0);
-      if (part_m >= kLeastClimbM && part_m <= easy_m && CarriesOrOverhangs(shorter)) {
-        return shorter;
-      }
+      if (part_m > easy_m || !CarriesOrOverhangs(shorter)) continue;
+      if (part_m >= kLeastClimbM) return shorter;
+      if (!before_edge && part_m > -kLeastClimbM) before_edge = shorter;
     }
-    return print;
+    return ahead_m > kLongClimbM ? before_edge.value_or(print) : print;
   }
 
   bool IsGood(const Footprint& print) {

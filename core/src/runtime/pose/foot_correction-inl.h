@@ -49,6 +49,14 @@ STRIDEWIRE_INLINE Number SettleLiftShareOf(Number settled) {
   return Constant<Number>(4.0) * settled * (Constant<Number>(1.0) - settled);
 }
 
+// Returns the share of the root's descent (FootTrajectory::root_shift_m.y) that is complete after
+// the fraction `elapsed` of the movement.
+template <typename Number>
+STRIDEWIRE_INLINE Number RootSinkShareOf(Number elapsed) {
+  return Constant<Number>(1.0) -
+         EaseOut(DivideBy(elapsed - Constant<Number>(kRootSinkStart), 1.0 - kRootSinkStart));
+}
+
 // Returns the part of the body's extra turn (Movement::extra_turn_rad) that is complete at a time.
 template <typename Number, typename Timing>
 STRIDEWIRE_INLINE Number ExtraTurnAt(const Timing& timing, Number at_s) {
@@ -130,6 +138,7 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   c.turn =
       Select(is_planted, free + lock * error, free + (one - c.turned) * trajectory.release_turn);
   c.root_shift = trajectory.root_shift * (one - EaseOut(timing.OfDuration(t)));
+  c.root_shift.y = trajectory.root_shift.y * RootSinkShareOf(timing.OfDuration(t));
   return c;
 }
 

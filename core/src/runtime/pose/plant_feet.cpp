@@ -100,6 +100,8 @@ DVec3 RootShare(const FootCorrection& correction) {
 
 double SettleLiftShare(double settled) { return SettleLiftShareOf(settled); }
 
+double RootSinkShare(double elapsed) { return RootSinkShareOf(elapsed); }
+
 double LiftShare(std::size_t lift, double swing) { return LiftShareOf(kLiftCurves[lift], swing); }
 
 Quat TurnOf(const FootCorrection& correction) {

@@ -34,6 +34,10 @@ struct FootCorrection {
   DVec3 root_shift_m = DVec3(0.0);
 };
 
+/// Returns the fraction of the root's descent (FootTrajectory::root_shift_m.y) that is complete
+/// after the fraction `elapsed` of the movement.
+[[nodiscard]] double RootSinkShare(double elapsed);
+
 /// Returns the fraction of FootTrajectory::settle_lift_m that is added when the fraction `settled`
 /// of the difference pose has faded out.
 [[nodiscard]] double SettleLiftShare(double settled);

@@ -33,6 +33,9 @@ inline constexpr double kGroundBlendLength = 0.4;
 // A foot that lands lower than it started descends after this fraction of the swing. A foot that
 // lands higher finishes its rise by the same fraction before the end of the swing.
 inline constexpr double kSinkStart = 0.35;
+// The root of a body that steps down descends after this fraction of the movement. If it descended
+// earlier, it would bend the knee of the leg that swings above the higher tread.
+inline constexpr double kRootSinkStart = 0.25;
 // A foot tilts with the slope of the ground that it stands on, but in the middle of a swing only by
 // this share of the slope. Otherwise, the ankle of a bent leg would bend too far on ramps.
 inline constexpr double kSwingTilt = 0.4;
