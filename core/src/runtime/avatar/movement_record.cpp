@@ -98,7 +98,7 @@ bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
       decision = DecisionOf(body.group().kind, body.movement);
       if (decision.extra_turn_rad != 0.0) flags |= record::kIsSteered;
       if (decision.is_on_terrain) flags |= record::kOnTerrain;
-      if (decision.aside_m != DVec3(0.0)) flags |= record::kAside;
+      if (decision.mid_swing_offset_m != DVec3(0.0)) flags |= record::kMidSwingOffset;
       if (decision.root_shift_m != DVec3(0.0)) flags |= record::kRootShift;
     }
   }

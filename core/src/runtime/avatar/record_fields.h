@@ -33,8 +33,8 @@ enum Flag : std::uint16_t {
   kIsEntered = 1 << 10,  // The movement began at a time later than 0.
   kIsSteered = 1 << 11,  // The record contains LandingDecision::extra_turn_rad.
   kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; the record contains lift_m and normal.
-  kAside = 1 << 13,      // The record contains LandingDecision::aside_m.
-  kRootShift = 1 << 14,  // The record contains LandingDecision::root_shift_m.
+  kMidSwingOffset = 1 << 13,  // The record contains LandingDecision::mid_swing_offset_m.
+  kRootShift = 1 << 14,       // The record contains LandingDecision::root_shift_m.
   // Change: the movement that began has a Movement::rate other than 1, which the record contains.
   kHasRate = 1 << 15,
   // State of a standing avatar: the value of AvatarBody::begins_planting.
@@ -84,7 +84,8 @@ void DecisionFields(Stream& stream, unsigned flags, MovementKind kind, L& decisi
     Vector(stream, decision.normal);
     stream.CheckUnit(decision.normal);
   }
-  if ((flags & kAside) != 0) stream.F64(decision.aside_m.x), stream.F64(decision.aside_m.z);
+  if ((flags & kMidSwingOffset) != 0)
+    stream.F64(decision.mid_swing_offset_m.x), stream.F64(decision.mid_swing_offset_m.z);
   if ((flags & kRootShift) != 0) Vector(stream, decision.root_shift_m);
 }
 
@@ -135,7 +136,7 @@ void PlanFields(Stream& stream, P& plan) {
       stream.CheckUnit(normal);
     }
     for (auto& lift : trajectory.lift_m) stream.F64(lift);
-    Vector(stream, trajectory.aside_m);
+    Vector(stream, trajectory.mid_swing_offset_m);
     Vector(stream, trajectory.root_shift_m);
     auto& residual = plan.residuals[f];
     Vector(stream, residual.offset_m);

@@ -50,7 +50,7 @@ struct FootTrajectory {
   /// the peak of a curve that fades in and out (LiftShare). The one in the middle may be negative.
   std::array<double, 3> lift_m{};
   /// Horizontal offset in the middle of the swing, to pass the other foot and the edges of treads.
-  DVec3 aside_m = DVec3(0.0);
+  DVec3 mid_swing_offset_m = DVec3(0.0);
   /// Share of the foot's correction by which the root moves; the shares of both feet sum to 1.
   double root_weight = 0.0;
   /// Shift of the root that is complete at the end of the movement.

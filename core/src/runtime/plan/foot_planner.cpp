@@ -460,7 +460,7 @@ class Planner {
   void ClearGround(Foot moving, const Terrain& terrain, FootTrajectory& trajectory) {
     const SwingPath path = ChooseSwing(SampleSoles(moving), trajectory, terrain);
     trajectory.lift_m = path.lift_m;
-    trajectory.aside_m = path.advance_m;
+    trajectory.mid_swing_offset_m = path.mid_swing_offset_m;
   }
 
  private:
@@ -642,7 +642,7 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
     if (!plan.keeps_above_ground) planner.LiftOverLevelGround(moving);
     if (target == nullptr) {
       if (plan.keeps_above_ground) trajectory.lift_m = decision.lift_m;
-      trajectory.aside_m = decision.aside_m;
+      trajectory.mid_swing_offset_m = decision.mid_swing_offset_m;
       trajectory.root_shift_m = decision.root_shift_m;
       return planner.Entry();
     }
@@ -653,8 +653,9 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
       root_sink_m = planner.RootSink(moving);
     }
     if (push_m > 0.0) {
-      trajectory.aside_m += RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
-                                      DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
+      trajectory.mid_swing_offset_m +=
+          RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
+                    DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
     }
     if (target->request.root_m)
       trajectory.root_shift_m = planner.RootShift(*target->request.root_m);

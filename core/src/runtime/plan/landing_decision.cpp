@@ -13,7 +13,7 @@ LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
   decision.height_m = trajectory.height_m[2];
   decision.normal = trajectory.normals[1];
   decision.lift_m = trajectory.lift_m;
-  decision.aside_m = trajectory.aside_m;
+  decision.mid_swing_offset_m = trajectory.mid_swing_offset_m;
   decision.root_shift_m = trajectory.root_shift_m;
   return decision;
 }

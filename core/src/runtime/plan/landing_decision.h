@@ -17,10 +17,10 @@ struct LandingDecision {
   // The following members are used for steps only.
   double turn_rad = 0.0;  ///< Turn of the foot at landing, relative to that of the library's step.
   double height_m = 0.0;  ///< Correction of the height of the blended foot at landing.
-  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Ground normal at landing, on terrain.
-  std::array<double, 3> lift_m{};        ///< FootTrajectory::lift_m
-  DVec3 aside_m = DVec3(0.0);            ///< FootTrajectory::aside_m
-  DVec3 root_shift_m = DVec3(0.0);       ///< FootTrajectory::root_shift_m
+  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);   ///< Ground normal at landing, on terrain.
+  std::array<double, 3> lift_m{};         ///< FootTrajectory::lift_m
+  DVec3 mid_swing_offset_m = DVec3(0.0);  ///< FootTrajectory::mid_swing_offset_m
+  DVec3 root_shift_m = DVec3(0.0);        ///< FootTrajectory::root_shift_m
 };
 
 /// Returns the decisions for a movement that has been planned.

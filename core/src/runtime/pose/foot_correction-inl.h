@@ -13,7 +13,7 @@
 // Data of a FootTrajectory and its FootResidual.
 template <typename Number, typename Vector>
 struct TrajectoryOf {
-  Vector from, to, release_offset, release_velocity, land_offset, land_velocity, aside;
+  Vector from, to, release_offset, release_velocity, land_offset, land_velocity, mid_swing_offset;
   Number height[3], turn[3], level[4];
   Vector residual_offset, residual_velocity, root_shift;
   Number from_heading, to_heading, release_turn, root_weight, residual_turn, residual_turn_s;
@@ -86,7 +86,7 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
       trajectory.release_offset * (OnePlusTwice(s) * r * r) +
       trajectory.land_offset * (s * s * OnePlusTwice(r)) +
       (trajectory.release_velocity * r - trajectory.land_velocity * s) * (length * s * r) +
-      trajectory.aside * (across * across);
+      trajectory.mid_swing_offset * (across * across);
   c.offset = Select(is_planted, print - ball, flying);
 
   // A foot that steps up rises early in the swing; a foot that steps down descends late.

@@ -73,7 +73,7 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   q = next();
   t.land_velocity = XyzOf(q), t.residual_turn = q.w;
   q = next();
-  t.aside = XyzOf(q), t.residual_turn_s = q.w;
+  t.mid_swing_offset = XyzOf(q), t.residual_turn_s = q.w;
   q = next();
   t.height[0] = q.x, t.height[1] = q.y, t.height[2] = q.z, t.residual_over_s = q.w;
   q = next();

@@ -66,7 +66,7 @@ TrajectoryOf<double, DVec3> TrajectoryFor(const FootPlan& plan, Foot foot) {
           .release_velocity = from.release_velocity_m_s,
           .land_offset = from.land_offset_m,
           .land_velocity = from.land_velocity_m_s,
-          .aside = from.aside_m,
+          .mid_swing_offset = from.mid_swing_offset_m,
           .height = {height[0], height[1], height[2]},
           .turn = {turn[0], turn[1], turn[2]},
           .level = {from.level_m[0], from.level_m[1], from.level_m[2], from.level_m[3]},
@@ -271,7 +271,7 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     add(trajectory.release_velocity_m_s, trajectory.root_weight);
     add(trajectory.land_offset_m, trajectory.lift_m[1]);
     add(trajectory.land_velocity_m_s, residual.turn_rad);
-    add(trajectory.aside_m, residual.turn_rad_s);
+    add(trajectory.mid_swing_offset_m, residual.turn_rad_s);
     add({trajectory.height_m[0], trajectory.height_m[1], trajectory.height_m[2]}, residual.over_s);
     add({trajectory.turn_rad[0], trajectory.turn_rad[1], trajectory.turn_rad[2]},
         trajectory.release_s);
