@@ -62,10 +62,11 @@ std::string ParseKinds(const std::string& kinds, AssembleOptions& options) {
 struct Captures {
   explicit Captures(const AssembleOptions& options) : assembler(options) {}
 
-  LibraryAssembler assembler;                // Contains the readable files only.
-  std::vector<Extraction> unreadable;        // Contains only path and error.
+  LibraryAssembler assembler;  // Contains the readable files only.
+  // Files that cannot be read. Only their path and error are set.
+  std::vector<Extraction> unreadable;
   std::vector<bool> is_readable;             // Of each file.
-  std::vector<FileConventions> conventions;  // Of the readable files.
+  std::vector<FileConventions> conventions;  // Conventions of the readable files.
 };
 
 // Reads the files with options of their own. Returns nothing if the user interrupts the program.

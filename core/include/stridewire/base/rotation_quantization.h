@@ -7,16 +7,18 @@
 
 namespace stridewire {
 
-/// How the rotation q of one joint is quantized: by the components x, y, z of d = conj(reference)
-/// q, negated if d's w is negative. Component c is low + k * step, with k stored in `bits` bits;
-/// without bits it is `low`. w follows from the other components. A joint that may rotate in any
-/// direction uses smallest-three encoding of q instead, with `smallest_three_bits` per component.
+/// Describes how the rotation q of one joint is quantized. Let d = conj(reference) q, negated if
+/// its w is negative. The code contains the components x, y and z of d: component c is low + k *
+/// step, and the code contains k in `bits` bits. A component without bits is `low`. The decoder
+/// computes w from the other components. A joint that may rotate in any direction uses
+/// smallest-three encoding of q instead, with `smallest_three_bits` per component.
 struct RotationQuantization {
   static constexpr std::uint8_t kMaxBits = 16;
   static constexpr std::uint8_t kMinFreeBits = 8;
   static constexpr std::uint8_t kMaxFreeBits = 15;
   static constexpr float kMinStep = 0x1p-20f;
-  /// If w is smaller, its error is too large, because it is computed from the other components.
+  /// Smallest permitted least_w. The decoder computes w from the other components, so the error of
+  /// a smaller w would be too large.
   static constexpr float kMinLeastW = 0.3f;
 
   Quat reference = kIdentityQuat;

@@ -40,7 +40,7 @@ struct Capture {
 /// kMaxJoints limits the number of joints. Memory use depends on the data in the file, not on the
 /// counts that its header declares.
 inline constexpr std::uint64_t kMaxBvhBytes = std::uint64_t{512} << 20;
-inline constexpr int kMaxBvhDepth = 128;  ///< Levels of nested joints.
+inline constexpr int kMaxBvhDepth = 128;  ///< Maximum depth of nested joints.
 /// Maximum number of frames times joints.
 inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;
 inline constexpr double kMaxBvhNumber = 1e7;  ///< Largest magnitude of any number in the file.
@@ -83,11 +83,12 @@ struct BvhReadOptions {
 /// - `Frame Time` is rounded to a whole number of frames per second if its digits allow it.
 /// - The reader detects legs by joint names, whose end contains the side and the part of the leg.
 ///   If that fails, it takes the longest pair of equally long chains that start nearest to the root
-///   and whose ends are below the rest of the body. Joints inside the thigh or the shin that never
-///   bend the leg are no knees. A figure that lacks a leg or has more than two is rejected. If
-///   there is no toe joint, the ball of the foot is a fixed point in the frame of the ankle. This
-///   point is the End Site of the foot if that is nearer than 0.2 leg lengths. Otherwise it is 2/3
-///   of the way there, at the height of the End Site above a flat sole.
+///   and whose ends are below the rest of the body. A joint that never bends the leg divides the
+///   thigh or the shin, but is not the knee. A figure without two legs, or with more than two, is
+///   rejected. If there is no toe joint, the ball of the foot is a fixed point in the frame of the
+///   ankle. This point is the End Site of the foot if that is nearer than 0.2 leg lengths.
+///   Otherwise its horizontal distance from the ankle is 2/3 of that of the End Site, and it is as
+///   high as the End Site when the sole is flat.
 /// - The up axis is that of a rest pose that stands. If the rest pose does not stand, or if the
 ///   figure clearly stands and moves along another axis, it is the mean direction from ankles to
 ///   hips over the motion. A rest pose that stands is turned to face +Z. Otherwise the frames of

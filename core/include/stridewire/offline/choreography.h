@@ -17,9 +17,11 @@ namespace stridewire {
 /// Limits on a choreography. A file that exceeds one of them is rejected with kLimitExceeded.
 inline constexpr std::size_t kMaxChoreographyBytes = std::size_t{4} << 20;
 inline constexpr std::size_t kMaxChoreographyMovements = 65'536;
-inline constexpr int kMaxChoreographyDepth = 16;           ///< Levels of nested JSON values.
-inline constexpr double kMaxChoreographyPositionM = 1e5;   ///< Magnitude of a start coordinate.
-inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Magnitude of the start heading.
+inline constexpr int kMaxChoreographyDepth = 16;  ///< Maximum depth of nested JSON values.
+/// Largest magnitude of a start coordinate.
+inline constexpr double kMaxChoreographyPositionM = 1e5;
+/// Largest magnitude of the start heading.
+inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 
 /// A start position and a list of movements that an avatar plays one after the other. As JSON:
 ///

@@ -20,10 +20,11 @@ struct SelectionOptions {
   /// far the step's parameters lie outside the hull of the kept examples, grown by 10 %. Metres;
   /// one radian counts as 0.5 m. 0 keeps every step.
   double max_pose_error_m = 0.0;
-  /// A step is an outlier if its pose or duration differs from what all other steps predict for its
-  /// parameters by this number of deviations (1.4826 MAD) more than usual. Only steps inside the
-  /// hull of the others are tested, in groups of at least eight, and at most one in ten is removed:
-  /// steps at the edge of the hull are rare, not wrong. 0 disables the test.
+  /// All other steps predict the pose and the duration of a step from its parameters. The step is
+  /// an outlier if the error of a prediction exceeds the median error of the group by more than
+  /// this number of deviations (1.4826 MAD). Only steps inside the hull of the others are tested,
+  /// in groups of at least eight, and at most one in ten is removed: steps at the edge of the hull
+  /// are rare, not wrong. 0 disables the test.
   double outlier_deviations = 0.0;
 };
 

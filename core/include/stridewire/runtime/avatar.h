@@ -15,22 +15,26 @@
 namespace stridewire {
 
 enum class AvatarEventType : std::uint8_t {
-  kStarted,     ///< A movement began: group, requested and applied parameters.
-  kFootStrike,  ///< A foot touched the ground: which foot, and where its ball is.
-  kFinished,    ///< A movement ended: the new base frame.
-  kIdle,        ///< The avatar stands still and its queue is empty.
-  /// A request could not be carried out: code and reason, and for a step or jump that is out of
-  /// reach the nearest one. The requests queued after it are played.
+  /// A movement began. The event contains its group and its requested and applied parameters.
+  kStarted,
+  /// A foot touched the ground. The event contains the foot and the position of its ball.
+  kFootStrike,
+  kFinished,  ///< A movement ended. The event contains the new base frame.
+  kIdle,      ///< The avatar stands still and its queue is empty.
+  /// The avatar could not execute a request. The event contains the code and the reason and, if a
+  /// step or jump is out of reach, the nearest one in reach. The avatar continues with the next
+  /// request.
   kRejected,
-  kDropped,  ///< A request was dropped before it was completed: outcome and reason.
+  /// A request was dropped before it was completed. The event contains the outcome and the reason.
+  kDropped,
 };
 
 /// How a request ended.
 enum class RequestOutcome : std::uint8_t {
   kNone,       ///< The request has not ended.
   kCompleted,  ///< kFinished: the movement was played to its end, or the walk has arrived.
-  kRejected,   ///< kRejected: the avatar could not carry it out.
-  kCancelled,  ///< kDropped: CancelQueue or Teleport dropped it.
+  kRejected,   ///< kRejected: the avatar could not execute the request.
+  kCancelled,  ///< kDropped: CancelQueue or Teleport dropped the request.
   /// kDropped or kFinished: a request with an interrupt dropped it or cut its movement short.
   kReplaced,
   kRemoved,  ///< kDropped: the avatar was removed.
@@ -145,7 +149,8 @@ class AvatarSimulation;
 class Avatar {
  public:
   static constexpr int kMaxQueue = 1024;
-  /// Number of events of an Advance, without those of requests that were dropped before it.
+  /// Maximum number of events of one Advance, not counting the events of requests that were dropped
+  /// before it.
   static constexpr std::size_t kMaxEventsPerAdvance = 16;
 
   /// Creates an avatar that stands at `start` in the library's stand pose. `library` must not be

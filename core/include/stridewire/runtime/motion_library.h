@@ -139,8 +139,8 @@ struct MotionGroup {
   std::span<const double> linear;
   /// [site][example]: coefficients r of the radial functions.
   std::span<const double> radial;
-  std::span<const int> cells;          ///< Grid cells per keytime interval.
-  int grid_point_count = 0;            ///< Sum of `cells`, plus 1.
+  std::span<const int> cells;  ///< [interval]: number of grid cells of the keytime interval.
+  int grid_point_count = 0;    ///< Sum of `cells`, plus 1.
   std::span<const double> keytimes_s;  ///< [example][interval + 1]: keytimes, with K_0 = 0.
   /// [example]: heading at the end of the example; it starts at 0.
   std::span<const double> heading_change_rad;
@@ -172,7 +172,8 @@ class MotionLibrary {
  public:
   static constexpr int kFormatVersion = 3;
   static constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
-  static constexpr int kMaxGroups = 254;       ///< Movement records store indices as bytes.
+  /// Maximum number of groups in a file. Movement records store the index of a group in one byte.
+  static constexpr int kMaxGroups = 254;
   static constexpr int kMaxExamples = 4096;    ///< Per group.
   static constexpr int kMaxGridPoints = 4096;  ///< Per group.
 
@@ -242,7 +243,7 @@ class MotionLibrary {
 
   Skeleton skeleton_;
   GridLayout layout_;
-  std::vector<MotionGroup> groups_;  // Those of the file, then those of stand_motion_.
+  std::vector<MotionGroup> groups_;  // The groups of the file, followed by those of stand_motion_.
   std::size_t file_group_count_ = 0;
   std::vector<LayerClip> layers_;
   std::vector<Transition> transitions_;

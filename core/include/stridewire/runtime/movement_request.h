@@ -67,9 +67,9 @@ struct StandRequest {
 };
 
 /// Requests a walk to a place, with as many steps as necessary (walk_planner.h). Events of its
-/// steps have the id of the request. On arrival a kFinished event of kind kStand with this id
-/// follows; if the walk fails, a kRejected event with the reason; if it is dropped in progress, a
-/// kDropped event after its current step.
+/// steps have the id of the request. When the avatar has arrived, a kFinished event of kind kStand
+/// with this id follows. If the walk fails, a kRejected event contains the reason. If the walk is
+/// dropped in progress, a kDropped event follows after its current step.
 struct WalkRequest {
   DVec3 position_m = DVec3(0.0);   ///< Base frame at the end. y is ignored; the ground sets it.
   double heading_rad = 0.0;        ///< Heading of the base frame at the end.
@@ -78,7 +78,7 @@ struct WalkRequest {
   std::optional<double> speed_m_s;
 };
 
-/// When a request begins, and whether it replaces the requests before it.
+/// Determines when a request begins, and whether it replaces earlier requests.
 enum class Interrupt : std::uint8_t {
   kNone,  ///< After all queued requests.
   /// After the current movement. A current stand or walk ends. The queue is dropped.
@@ -101,7 +101,7 @@ struct LayerRequest {
   int layer = 0;  ///< Index in MotionLibrary::layers().
   /// True starts or changes the layer. False ends it; weight and speed are then ignored.
   bool enabled = true;
-  double weight = 1.0;   ///< Factor on the joint weights of the clip, in (0, 1].
+  double weight = 1.0;   ///< Factor for the joint weights of the clip, in (0, 1].
   double blend_s = 0.3;  ///< Seconds until weight and speed are reached, in [0, kMaxLayerBlendS].
   double speed = 1.0;    ///< Playback speed, kMinLayerSpeed to kMaxLayerSpeed; 1: as recorded.
 };

@@ -16,10 +16,11 @@ namespace stridewire {
 inline constexpr std::int32_t kMaxTerrainColumns = 1024;
 inline constexpr std::int32_t kMaxTerrainRows = 1024;
 inline constexpr std::size_t kMaxTerrainBoxes = 65'536;
-inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Magnitude of ground heights.
-inline constexpr double kMinTerrainCellM = 0.01;   ///< Distance between samples of a height field.
+inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Largest magnitude of a ground height.
+/// Smallest distance between samples of a height field.
+inline constexpr double kMinTerrainCellM = 0.01;
 inline constexpr double kMaxTerrainCellM = 1e3;
-inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Magnitude of each coordinate.
+inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Largest magnitude of each coordinate.
 /// Largest number of boxes that intersect one cell of the terrain's spatial index, which bounds the
 /// time of a query. Only terrains in which hundreds of boxes overlap exceed it.
 inline constexpr std::size_t kMaxTerrainBoxesPerCell = 256;

@@ -34,7 +34,7 @@ class GroupProbe {
   [[nodiscard]] Correction Correct(const MotionGroup& group, const ParameterValues& wanted,
                                    const CorrectionLimits& limits);
 
-  // Returns the weights [n] of the last Correct.
+  // Returns the weights [n] that the last call of Correct has computed.
   [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) {
     return scratch_.weights(group);
   }

@@ -174,7 +174,7 @@ Status FitSmoothWeights(std::span<const double> scales, StoredGroup& stored,
 // Converts the groups of a raw library to the form in which library files contain them.
 class GroupConverter {
  public:
-  // The notes and selections of `builder` receive what the converter does.
+  // The converter appends its notes and selections to those of `builder`.
   GroupConverter(const RawLibrary& raw, LibraryBuilder& builder)
       : raw_(raw), builder_(builder), layout_(raw.skeleton.joint_count()) {}
 
@@ -325,8 +325,8 @@ class GroupConverter {
   const RawLibrary& raw_;
   LibraryBuilder& builder_;
   GridLayout layout_;
-  int index_ = 0;                                     // Of the current group.
-  std::vector<std::unique_ptr<StoredGroup>> groups_;  // Own the data that `views_` refer to.
+  int index_ = 0;                                     // Index of the current group.
+  std::vector<std::unique_ptr<StoredGroup>> groups_;  // Owners of the data to which `views_` refer.
   std::vector<MotionGroup> views_;
 };
 

@@ -77,7 +77,8 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   if (content.groups.empty()) {
     return Fail(ErrorCode::kOutOfRange, "there are no examples to build a library from");
   }
-  // Nearly all of a library are its grids. Growing the buffer would copy them several times.
+  // Grids make up nearly the whole library. If the buffer had to grow, it would copy them several
+  // times.
   std::size_t size_estimate = 1 << 18;
   for (const MotionGroup& group : content.groups) {
     size_estimate += group.grid.size() * sizeof(group.grid.front());

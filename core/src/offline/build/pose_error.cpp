@@ -66,7 +66,7 @@ std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton, ConstPoseSpan stan
   for (std::size_t j = 1; j < n; ++j) {
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
     if (parts[j] != BodyPart::kTrunk || above_hip[j] || carries_arm[j]) continue;
-    // The arms are children of the root as well; its other children are not heads.
+    // If the arms branch off at the root, its other children still belong to the trunk.
     if (parts[parent] == BodyPart::kHead || (parent != 0 && carries_arm[parent])) {
       parts[j] = BodyPart::kHead;
     }

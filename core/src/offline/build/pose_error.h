@@ -13,7 +13,7 @@
 
 namespace stridewire {
 
-/// Parts of the body that are evaluated separately.
+/// Parts of the body for which PoseError contains separate distances.
 enum class BodyPart : std::uint8_t { kTrunk = 0, kHead = 1, kArms = 2, kLegs = 3 };
 inline constexpr int kBodyPartCount = 4;
 

@@ -15,7 +15,8 @@
 namespace stridewire {
 namespace {
 
-// Residual of a pseudoexample. Weights are floats, which limits positions of feet to about 1 um.
+// Largest accepted error at a pseudoexample. Weights are floats, which limits positions of feet to
+// about 1 um.
 constexpr double kMaxResidualM = 5e-6;
 constexpr CorrectionLimits kSolve = {.max_iterations = 40, .tolerance_m = 1e-6};
 // An improvement counts only if the largest error decreases by this share. Smaller changes are
@@ -105,7 +106,7 @@ GroupQuality QualityOf(const HullSurvey& survey, double condition) {
 // One pass of the amended rule (see Refine).
 struct Pass {
   RadiusRule radii = RadiusRule::kExamples;
-  double radius_factor = 1.0;  // Factor on the radii of the examples.
+  double radius_factor = 1.0;  // Factor by which the radii of the examples are multiplied.
   // True if the pass also adds sites that increase the error, because later sites may reduce it
   // again.
   bool accepts_any = false;

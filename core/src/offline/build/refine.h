@@ -26,7 +26,7 @@ enum class RadiusRule : std::uint8_t {
 
 /// Limits of the amended rule. If a group exceeds a limit even without pseudoexamples, its own
 /// value is the limit.
-inline constexpr double kMaxRefinedWeightSum = 2.5;  ///< Sum of |w| over the hull.
+inline constexpr double kMaxRefinedWeightSum = 2.5;  ///< Largest sum of |w| over the hull.
 inline constexpr double kMaxRefinedCondition = 1e3;
 /// Minimum distance between a pseudoexample and any other site, in scaled parameters.
 inline constexpr double kMinPseudoexampleDistance = 0.03;
@@ -36,7 +36,7 @@ struct RefineOptions {
   double max_error_m = 0.01;  ///< Groups with smaller errors are not refined.
   /// Maximum number of pseudoexamples per group, 0 to kMaxPseudoexamples.
   int max_pseudoexamples = 32;
-  int samples = 3000;  ///< Samples of the hull; 1 to kMaxSamples.
+  int samples = 3000;  ///< Number of samples of the hull, 1 to kMaxSamples.
   std::uint32_t seed = 1;
   int threads = 0;  ///< Number of threads; 0: one per processor. It does not affect the result.
   /// Called repeatedly, on the thread that called Refine, with the estimated share of the work that
@@ -71,9 +71,9 @@ struct GroupRefinement {
   GroupQuality after;   ///< Quality with pseudoexamples, measured with the same samples.
   double pseudoexample_error_m = 0.0;        ///< Largest error at a pseudoexample.
   RadiusRule radii = RadiusRule::kExamples;  ///< Radius rule of the best pass, see Refine.
-  double radius_factor = 1.0;                ///< Factor on the radii of the examples.
-  int rejected = 0;                          ///< Number of tried and rejected pseudoexamples.
-  std::vector<double> max_error_curve_m;     ///< Largest error with 0, 1, ... pseudoexamples.
+  double radius_factor = 1.0;  ///< Factor by which the radii of the examples were multiplied.
+  int rejected = 0;            ///< Number of tried and rejected pseudoexamples.
+  std::vector<double> max_error_curve_m;  ///< Largest error with 0, 1, ... pseudoexamples.
   RefineEnd end = RefineEnd::kErrorReached;
 };
 

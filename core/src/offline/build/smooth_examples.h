@@ -84,7 +84,7 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
 // equal to the distance of the nearest site, only the linear part would act in most of the hull.
 struct SmoothBasis {
   CardinalBasis basis;
-  double radius_factor = 1.0;  // Factor on the dilations.
+  double radius_factor = 1.0;  // Factor by which the dilations are multiplied.
 };
 [[nodiscard]] Expected<SmoothBasis> FitSmoothBasis(std::span<const double> sites,
                                                    std::span<const double> scales);

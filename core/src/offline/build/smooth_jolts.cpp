@@ -10,7 +10,7 @@ namespace stridewire {
 namespace {
 
 constexpr double kJoltRadPerS2 = 400.0;
-// Standard deviation of the mean: growth per round and largest value.
+// Standard deviation of the Gaussian weights of a mean: its growth per round and its largest value.
 constexpr double kDeviationGrowthS = 0.005;
 constexpr double kMaxDeviationS = 0.06;
 // The deviation falls to 0 within this time before and after a jolt.
@@ -35,7 +35,7 @@ std::vector<bool> SmoothedJoints(const Skeleton& skeleton) {
   for (std::size_t j = 1; j < skeleton.joints.size(); ++j) {
     if (IsLimbEnd(skeleton, static_cast<int>(j))) is_smoothed[j] = false;
   }
-  // Everything between the root and the end of a leg.
+  // Excludes the joints of the legs and all joints between them and the root.
   for (const Leg& leg : skeleton.legs) {
     for (int j = leg.ball; j > 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
       is_smoothed[static_cast<std::size_t>(j)] = false;
@@ -98,7 +98,8 @@ class JoltFilter {
     return has_changed;
   }
 
-  // The mean is symmetric. At the ends, it thus is the original rotation.
+  // Returns the mean over equally many rotations before and after a point. The first and the last
+  // point have no rotations on one side, so they keep their own.
   [[nodiscard]] Quat MeanAround(std::size_t point) const {
     const double deviation = deviation_s_[point] / spacing_s_;
     const auto reach = std::min({static_cast<std::size_t>(std::ceil(kMeanReach * deviation)), point,

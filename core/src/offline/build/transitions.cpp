@@ -72,7 +72,8 @@ class MomentReader {
   struct GridEnd {
     int point = 0;
     int neighbour = 0;
-    double to_neighbour_s = 0.0;  // Negative if the neighbour is earlier.
+    // Time from this point to the neighbour; negative if the neighbour is earlier.
+    double to_neighbour_s = 0.0;
     double heading_rad = 0.0;
     double ground_m = 0.0;
   };

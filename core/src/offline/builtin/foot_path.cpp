@@ -251,8 +251,8 @@ double FootPaths::GroundAt(double z_m) const {
   return 0.0;
 }
 
-// Returns the smallest distance between the swinging and the fixed foot, seen from above, between
-// heel and toe tip.
+// Returns the smallest distance between the feet during the swing, seen from above. Each foot
+// counts as the line from its heel to its toe tip.
 double FootPaths::NearestApproach() const {
   const Foot fixed = OtherFoot(moving_);
   const auto points = [](Foot foot, const FootPose& foot_pose, DVec3(&out)[5]) {

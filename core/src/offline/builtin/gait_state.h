@@ -23,7 +23,7 @@ inline constexpr double kClipFps = 120.0;
 /// Pitches of a foot while it rolls over its ball, as shares of its pitch at toe-off.
 struct RollOff {
   double heel_rise_swing;  ///< Fraction of the swing of the other foot at which the heel rises.
-  double strike;           ///< When the other foot lands.
+  double strike;           ///< Pitch when the other foot lands.
   double strike_rate;      ///< Per half of double support.
   double state;            ///< In the middle of double support.
   double state_rate;       ///< Per half of double support.

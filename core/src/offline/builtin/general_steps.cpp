@@ -43,7 +43,7 @@ std::string Describe(const StepShape& shape) {
 constexpr double kWalkTurnRad = 40.0 * kDegree;
 constexpr double kSpotTurnRad = 60.0 * kDegree;
 
-// Returns the sideways distance of the feet after one of them has turned outward on the spot.
+// Returns the sideways distance between the feet after one of them has turned outward on the spot.
 double WidthAfterTurnM(double turn_rad) {
   return StandWidthM() + (0.26 - StandWidthM()) * std::min(1.0, turn_rad / kSpotTurnRad + 0.2);
 }

@@ -7,7 +7,8 @@ namespace stridewire::builtin {
 
 /// Each function adds a group of left steps and one of their mirror images to `library`. The
 /// comments list the parameters of the groups.
-void AddStraightSteps(RawLibrary& library);  ///< start_z, end_z. Call it before the others.
+/// Parameters start_z, end_z. Call it before the other functions.
+void AddStraightSteps(RawLibrary& library);
 void AddBackwardSteps(RawLibrary& library);  ///< start_z, end_z
 void AddTurningSteps(RawLibrary& library);   ///< Parameters start_x, start_z, end_z, turn.
 void AddSideSteps(RawLibrary& library);      ///< Parameters start_x, start_z, end_x, end_z.

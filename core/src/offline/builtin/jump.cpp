@@ -28,7 +28,7 @@ class JumpPath {
  public:
   JumpPath(const Skeleton& figure, double length_m) : figure_(figure), length_m_(length_m) {
     // The height of the centre of mass at landing depends on the pose, whose curves depend on the
-    // times. Three iterations converge to the frame.
+    // times. After three iterations, the times no longer change by a frame.
     double lower_m = 0.15;
     for (int i = 0; i < 3; ++i) {
       PlanTimes(lower_m);

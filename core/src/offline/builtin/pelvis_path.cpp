@@ -184,7 +184,8 @@ DVec3 PelvisPath::Position(double time_s) const {
 
 double PelvisPath::Heading(double time_s) const {
   if (timing_.shape.turn_rad == 0.0) return 0.0;
-  // SmootherStep, multiplied in the order that the bytes of the library depend on.
+  // This is turn_rad * SmootherStep(s). The order of the multiplications must not change: it
+  // determines rounding, and therefore the bytes of the library.
   const double s = std::clamp(time_s / timing_.end_s, 0.0, 1.0);
   return timing_.shape.turn_rad * s * s * s * (10.0 + s * (6.0 * s - 15.0));
 }

@@ -30,7 +30,7 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   const double weight_shift_s = in_place ? 0.20 : 0.27;
   const double settling_s = 0.12 * step_s + (in_place ? 0.10 : 0.15);
   timing.toe_off_s = timing.start.standing() ? weight_shift_s : timing.start.half_support_s;
-  // The swing of steps from and to standing takes the same share of the step as in slow walking.
+  // In steps from or to standing, the swing lasts the same fraction of the step as in slow walking.
   const auto half_support_s = [&](const GaitState& state) {
     return state.standing() ? 0.12 * step_s : state.half_support_s;
   };

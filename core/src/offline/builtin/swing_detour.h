@@ -5,8 +5,8 @@ namespace stridewire::builtin {
 /// Sideways detours that a swinging foot may take around the other foot.
 struct DetourRange {
   double max_m = 0.0;
-  double step_m = 0.0;       ///< Difference between two detours that are tried.
-  double clearance_m = 0.0;  ///< Distance at which the feet do not touch.
+  double step_m = 0.0;       ///< Difference between successive detours that are tried.
+  double clearance_m = 0.0;  ///< Smallest distance between the feet at which they do not touch.
 };
 
 /// Returns the smallest detour at which the feet stay `clearance_m` apart. If there is none,

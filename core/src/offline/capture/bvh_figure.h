@@ -31,7 +31,8 @@ struct BvhFigure {
   Clip clip;                        ///< Local rotations; its root positions are not set.
   std::vector<DVec3> roots;         ///< Root position in each frame.
   FoundLegs legs;
-  /// Rotation of the joints above the root that never turn. The rest pose of the file contains it.
+  /// Product of the constant rotations of the joints above the root. It applies to the rest pose of
+  /// the file as well.
   DQuat fixed_turn = DQuat(1.0, 0.0, 0.0, 0.0);
   int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
   std::vector<AveragedJoint> averaged;

@@ -22,7 +22,7 @@ struct FileConventions {
 
 [[nodiscard]] FileConventions ConventionsOf(const Capture& capture);
 
-/// The conventions that a file should be read with so that it agrees with the other files.
+/// The conventions with which a file has to be read so that it agrees with the other files.
 struct AgreedConventions {
   std::optional<BvhAxis> up;       ///< Empty: as it was read.
   std::optional<double> unit_m;    ///< Empty: as it was read.

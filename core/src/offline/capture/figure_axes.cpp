@@ -16,7 +16,8 @@ namespace stridewire {
 namespace {
 
 constexpr double kSnapCos = 0.906;  // Directions within 25 degrees of an axis snap to it.
-// A rest pose stands if its legs point this exactly along an axis and are this straight.
+// A rest pose stands if the cosine of the angle between its legs and an axis is at least kRestCos,
+// and if the vectors from its ankles to its hips are at least kStraightShare of the leg length.
 constexpr double kRestCos = 0.8;
 constexpr double kStraightShare = 0.9;
 // Cosines of the angle between an axis and the mean direction from the feet to the hips. At least
@@ -25,14 +26,16 @@ constexpr double kStraightShare = 0.9;
 constexpr double kMotionCos = 0.85;
 constexpr double kWeakMotionCos = 0.35;
 // The following distances are in leg lengths.
-constexpr double kAtZero = 0.12;  // Largest distance from zero of a floor that counts as at zero.
+constexpr double kAtZero = 0.12;  // A floor at most this far from zero counts as a floor at zero.
 // A figure travels horizontally if it moves at least kMinTravel along that axis, and at least
 // kTravelRatio times as far as along the up axis.
 constexpr double kMinTravel = 0.6;
 constexpr double kTravelRatio = 2.0;
-constexpr double kMaxRise =
-    0.3;  // A figure on a level floor moves less than this along the up axis.
-// Smallest difference of cosines by which the motion prefers one up axis to another.
+// A figure on a level floor moves less than this along the up axis.
+constexpr double kMaxRise = 0.3;
+// The fixed rotation of the joints above the root applies to the up axis of the rest pose if it
+// increases the cosine of the angle to the mean direction from the feet to the hips by at least
+// this much (RestUpInWorld).
 constexpr double kClearGain = 0.5;
 // If the sum of both unit foot vectors is shorter, the feet have no common direction.
 constexpr double kClearFeet = 0.5;
@@ -53,7 +56,7 @@ DQuat TurnToOurAxes(const DVec3& left, const DVec3& up) {
   return glm::normalize(glm::quat_cast(glm::transpose(glm::dmat3(left, up, forward))));
 }
 
-// A quantile of a list that is sorted in place.
+// Returns a quantile of `values`, which it sorts.
 double Quantile(std::vector<double>& values, double q) {
   std::ranges::sort(values);
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
@@ -183,9 +186,10 @@ class AxesFinder {
     return travels || (HasFloorAtZero(along_up) && !HasFloorAtZero(along_other));
   }
 
-  // The up axis of the rest pose in the world. Joints above the root may turn the whole figure by a
-  // fixed rotation. Some programs export a figure with another up axis below such a joint, while in
-  // other files the motion of the hips undoes the rotation. The motion tells them apart.
+  // Returns the up axis of the rest pose in the world. Joints above the root may turn the whole
+  // figure by a fixed rotation. Some programs export a figure with another up axis below such a
+  // joint, while in other files the motion of the hips undoes the rotation. The motion determines
+  // which of both is the case.
   DVec3 RestUpInWorld(const DVec3& mean_legs_up) const {
     const DVec3 plain = AxisVector(rest_axis_);
     const DVec3 turned = figure_.fixed_turn * plain;
@@ -244,8 +248,9 @@ class AxesFinder {
     }
   }
 
-  // A figure that lies all the time would make its own long axis the up axis. Its feet are then far
-  // from zero along that axis, while its lowest joints are near zero along the usual up axis.
+  // Corrects the up axis of a figure that lies all the time. For such a figure, the direction from
+  // the feet to the hips is not up. Its feet are far from zero along that axis, while its lowest
+  // joints are near zero along the usual up axis.
   void AvoidLying() {
     const DVec3 up = AxisVector(axes_.up);
     const Extent along_up = ExtentAlong(up);
@@ -346,7 +351,7 @@ class AxesFinder {
       return {};
     }
     axes_.joint_turn = TurnToOurAxes(left, rest_up);
-    // The world turns like the joint frames if that makes it upright.
+    // Uses the rotation of the joint frames for the world as well if the up axis then becomes +Y.
     const DQuat turn = glm::normalize(axes_.joint_turn * glm::conjugate(figure_.fixed_turn));
     if ((turn * world_up).y > 0.999) {
       axes_.world_turn = turn;
@@ -359,7 +364,7 @@ class AxesFinder {
   BvhFigure& figure_;
   std::optional<BvhAxis> given_up_;
   const std::string& name_;
-  double leg_length_ = 0.0;  // Mean of both legs.
+  double leg_length_ = 0.0;  // Mean length of both legs.
   std::vector<DVec3> rest_;
   std::vector<DQuat> rotations_;  // Scratch of ComputePose.
   std::vector<Sampled> samples_;

@@ -207,7 +207,9 @@ Expected<FoundLegs> FindLegsByShape(const FigureShape& figure) {
   FoundLegs legs;
   legs.by_shape = true;
   legs.root = figure.joints[Index(best->chains[0].front())].parent;
-  int votes = 0;  // Joint names that agree with the first chain being left, minus the others.
+  // Number of joint names that identify the first chain as the left one, minus the number of names
+  // that contradict this.
+  int votes = 0;
   for (int side = 0; side < 2; ++side) {
     legs.legs[side] = FindLegInChain(figure, best->chains[side]);
     for (const int j : best->chains[side]) {
@@ -264,7 +266,7 @@ bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
     const double length = ChainLength(figure.joints, leg.hip, leg.ankle);
     for (const int ankle : NamedAnkles(figure, side)) {
       if (IsBelow(figure.joints, ankle, leg.hip) || !HasNamedLeg(figure, ankle)) continue;
-      int top = ankle;  // The upper end of its thigh or shin.
+      int top = ankle;  // The upper end of the thigh or shin of this leg.
       for (int j = ankle; j >= 0; j = figure.joints[Index(j)].parent) {
         const LegPart part = ReadLegName(figure.joints[Index(j)].name).part;
         if (part == LegPart::kKnee || part == LegPart::kHip) top = j;

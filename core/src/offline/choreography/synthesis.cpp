@@ -153,8 +153,8 @@ void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footpr
   record.landing_error_rad = std::fabs(WrapAngle(lands.heading_rad - requested.heading_rad));
 }
 
-// Returns the mean parameters of the examples, weighted. Cardinal functions give these weights for
-// these parameters.
+// Returns the weighted mean of the parameters of the examples, sum w_i p_i. Without weight
+// correction and pseudoexamples, these are the parameters for which the weights were computed.
 ParameterValues MeanParameters(const MotionGroup& group, std::span<const float> weights) {
   ParameterValues mean;
   mean.count = group.parameter_count();

@@ -16,9 +16,10 @@ constexpr double kSpotTurnRad = 60.0 * kDegree;
 // The following lengths suit a person whose legs have the length kReferenceLegM, and are scaled
 // with the legs.
 constexpr double kReferenceLegM = 0.86;
-constexpr double kSideStepM = 0.3;         // Additional width of a side step.
-constexpr double kDiagonalLengthM = 0.4;   // Forward distance of the feet in diagonal steps.
-constexpr double kWidthAfterTurnM = 0.26;  // Sideways distance of the feet after a turn outward.
+constexpr double kSideStepM = 0.3;        // Additional width of a side step.
+constexpr double kDiagonalLengthM = 0.4;  // Forward distance between the feet in diagonal steps.
+// Sideways distance between the feet after a turn outward.
+constexpr double kWidthAfterTurnM = 0.26;
 constexpr std::array kBackwardLengthsM = {0.0, 0.2, 0.4};
 
 // Sideways distances of the feet are at least these, whatever the captures contain.
@@ -53,17 +54,18 @@ class BasicStepList {
   [[nodiscard]] double stand_width() const {
     return SideSign(foot_) * person_.StandVector(foot_).x;
   }
-  // Forward distance of the feet in the middle of double support of the captured strides.
+  // Forward distance between the feet in the middle of double support of the captured strides.
   [[nodiscard]] double full() const {
     return 0.5 * (stride().start_length_m + stride().end_length_m);
   }
-  // Returns the sideways distance of the feet if one is `length_m` ahead of the other. The longer
-  // the step, the closer it is to that of the captured strides.
+  // Returns the sideways distance between the feet if one is `length_m` ahead of the other. The
+  // longer the step, the closer it is to that of the captured strides.
   [[nodiscard]] double Width(double length_m) const {
     const double share = std::min(1.0, length_m / full());
     return stand_width() + share * (std::max(stride().width_m, kMinStrideWidthM) - stand_width());
   }
-  // Returns the part of the forward distance of the feet in the stand pose that remains in a step.
+  // Returns which part of the forward distance between the feet in the stand pose remains in a
+  // step.
   [[nodiscard]] double StandOffset(double length_m) const {
     return person_.StandVector(foot_).z * (1.0 - std::min(1.0, length_m / full()));
   }

@@ -28,7 +28,7 @@ using complete::StrideModel;
 // Soles of stands are less tilted than this.
 constexpr double kMaxTiltM = 0.02;
 
-// Collects the names of steps that the captures lack, to one side or to both.
+// Collects the names of steps that are missing in the captures, on one side or on both.
 class LackingList {
  public:
   void Add(const BasicStep& step, Foot foot) {
@@ -58,7 +58,7 @@ class LackingList {
   struct Entry {
     std::string name;
     bool has_direction = false;
-    std::array<bool, 2> sides{};  // Lacking to the left, to the right.
+    std::array<bool, 2> sides{};  // True if the step to the left, or to the right, is missing.
   };
   std::vector<Entry> entries_;
 };

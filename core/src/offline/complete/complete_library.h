@@ -8,18 +8,19 @@
 
 namespace stridewire {
 
-/// What the captures of a library lack, and what was generated instead.
+/// Describes which movements the captures of a library do not contain, and what was generated
+/// instead.
 struct Completion {
   /// Movements that the captures lack, for example "stops with the left foot".
   std::vector<std::string> lacking;
   int example_count = 0;            ///< Number of generated examples.
   bool has_composed_stand = false;  ///< The stand pose was composed, because none was captured.
-  std::string stand_reason;         ///< Why the stillest captured pose is not a stand.
+  std::string stand_reason;         ///< Reason why the stillest captured pose is not a stand.
   /// True if the captures contain no level stride straight ahead. The generated steps then follow
   /// the strides of the library `builtin`.
   bool has_generic_strides = false;
   std::optional<Foot> only_foot;  ///< Set if all captured steps are steps of this foot.
-  std::string failure;            ///< Why no steps could be generated, or empty.
+  std::string failure;  ///< Reason why no steps could be generated; empty if there is none.
 };
 
 /// Completes a library with steps that its captures lack: starts, stops, small steps, turns on the

@@ -20,14 +20,14 @@ struct StandParts {
   PostureSample mean;                ///< Mean posture; its root and feet are not used.
   std::array<DQuat, 2> ankles;       ///< [Foot]: rotation of the ankle while the sole is flat.
   std::array<double, 2> ball_y_m{};  ///< [Foot]: height of the ball while the sole is flat.
-  double width_m = 0.0;              ///< Sideways distance of the feet.
+  double width_m = 0.0;              ///< Sideways distance between the feet.
 };
 
-/// Measures the parts in the mean strides of both feet. Over both strides, the swings of arms and
-/// pelvis cancel out. The soles are flat in the middle of single support.
+/// Measures a StandParts in the mean strides of both feet. Over both strides, the swings of arms
+/// and pelvis cancel out. The soles are flat in the middle of single support.
 [[nodiscard]] StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides);
 
-/// Measures the parts in all captured steps of a library, for libraries without level strides
+/// Measures a StandParts in all captured steps of a library, for libraries without level strides
 /// straight ahead. Returns nullopt if the steps do not show the soles of both feet flat on the
 /// ground.
 [[nodiscard]] std::optional<StandParts> MeasureStandParts(const RawLibrary& library);

@@ -13,7 +13,8 @@ namespace stridewire::complete {
 
 /// Number of points per keytime interval at which the mean stride is stored.
 inline constexpr int kPointsPerInterval = 16;
-inline constexpr int kIntervals = 3;  ///< Between start, toe-off, heel-strike and end.
+/// Number of keytime intervals of a step: between start, toe-off, heel-strike and end.
+inline constexpr int kIntervals = 3;
 inline constexpr int kPointCount = kIntervals * kPointsPerInterval + 1;
 
 /// The mean of all strides of one foot in the captures that are level and straight ahead, as a

@@ -257,7 +257,8 @@ class Assembler {
     const auto turn = static_cast<std::size_t>(std::ranges::find(pool.names, ParameterName::kTurn) -
                                                pool.names.begin());
     if (std::ranges::find(spanned, turn) == spanned.end()) {
-      // Requests take the steps of a group without turns as steps straight ahead.
+      // Requests treat all steps of a group without the parameter for turns as steps straight
+      // ahead.
       const auto turns = [&](const RawExample& example) {
         return std::fabs(example.parameters[turn]) > kStraightTurnMaxRad;
       };

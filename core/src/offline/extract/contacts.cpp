@@ -19,8 +19,11 @@ constexpr double kFlightMinS = 0.15;
 // While a foot rolls off slowly, it may stop for up to this time.
 constexpr double kRollOffMaxS = 0.2;
 
-// Returns the lower quartile of the height of the ball while it rests. If only the heel touches the
-// ground, as at the end of a recording, the ball of the flat foot would be below the ankle.
+// Returns the height of the resting ball: the lower quartile over the frames in which the ball
+// hardly moves. If there are too few such frames, for example because a recording ends while only
+// the heel is on the ground, returns an estimate. It is the lower of two quartiles: that of the
+// ball over all frames, and that of the height that the ball would have if the foot was flat below
+// the ankle.
 double RestingBallHeight(const FootPaths& foot, const FrameRange& frames, double fps) {
   std::vector<double> still;
   std::vector<double> ball;

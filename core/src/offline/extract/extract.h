@@ -18,8 +18,8 @@ struct ExtractOptions {
   SegmentOptions segments;
   // Steps that satisfy the following four conditions are straight.
   double straight_turn_max_rad = 0.0698;  ///< Limit on the turn of the stride heading; 4 degrees.
-  /// Limit on the angle between the motion of the root and the heading; 15 degrees. Beyond it are
-  /// side and backward steps.
+  /// Limit on the angle between the motion of the root and the heading; 15 degrees. Steps with a
+  /// larger angle lead sideways or backward.
   double straight_drift_max_rad = 0.262;
   /// Limit on the difference between the heights of the ground under the two feet.
   double level_rise_max_m = 0.05;
@@ -44,9 +44,10 @@ struct ExtractedExample {
   RawExample example;
   bool settled = true;  ///< Jumps: false if the figure is still moving at the end.
   bool level = true;    ///< Steps: true if the ground at all three footholds is equal within 5 cm.
-  /// [foot][0 before, 1 after its swing]: height of the ground in the capture at each foothold,
-  /// relative to where it ought to be: on one level for steps on level ground, and on one level
-  /// before and one after a jump. 0 for steps between different heights.
+  /// [foot][0 before, 1 after its swing]: height of the captured ground at each foothold, minus the
+  /// expected height. The expected height is equal for all footholds of a level step, for both feet
+  /// before a jump, and for both feet after it. For steps between different heights the difference
+  /// is 0.
   std::array<std::array<double, 2>, 2> ground_m{};
 };
 
@@ -88,7 +89,8 @@ struct Extraction {
     /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
     Pose pose;
     double unrest = 0.0;  ///< Deviation from still, upright standing; smaller is better.
-    double tilt_m = 0.0;  ///< Deviation of the feet from flat ones, in height.
+    /// Sum of the height differences between points of the feet and those of flat feet.
+    double tilt_m = 0.0;
   };
   std::optional<Stand> stand;  ///< The stillest moment with both feet on the same ground.
 };

@@ -9,8 +9,7 @@
 namespace stridewire {
 namespace {
 
-// Without a moment at which the foot lies flat, each point is compared at this percentile of its
-// heights.
+// If the foot never lies flat, FlatHeight compares the points at this percentile of their heights.
 constexpr double kLowPercentile = 3.0;
 constexpr double kSamePlaceM = 0.06;
 constexpr double kSamePlaceRiseM = 0.15;

@@ -20,7 +20,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNoiseRad = 4.0 * kDegree;
 constexpr double kSlopeRadPerS = 50.0 * kDegree;
 constexpr double kOscillationRad = 8.0 * kDegree;
-constexpr double kIndependentShare = 0.1;  // Neighbouring frames are strongly correlated.
+// Neighbouring frames are strongly correlated, so n frames count as n times this many measurements.
+constexpr double kIndependentShare = 0.1;
 
 struct StepTime {
   double centre = 0.0;  // Frame.

@@ -14,10 +14,13 @@ namespace {
 constexpr double kLevelPercentile = 3.0;
 // The motion of each point of the feet counts with the weight exp(-height / kFadeM).
 constexpr double kFadeM = 0.005;
-constexpr double kAirM = 0.06;         // If all points are higher than this, no foot supports.
-constexpr double kSlideMin_m_s = 0.2;  // Slower feet count as standing, although they creep.
-// Limits for a walk on the spot: the shortest path of the ground and, as shares of its length, the
-// longest motion of the pelvis, the least part per supporting foot and the least net displacement.
+// If all points of the feet are higher than this, the figure is in the air.
+constexpr double kAirM = 0.06;
+// Motion of supporting feet below this speed does not count as motion of the ground.
+constexpr double kSlideMin_m_s = 0.2;
+// A figure walks on the spot if the ground moves by at least kTravelMinM below it. The other limits
+// are fractions of the length of that path: the largest extent of the pelvis's motion, the smallest
+// fraction for which each foot is the supporting foot, and the smallest net displacement.
 constexpr double kTravelMinM = 0.5;
 constexpr double kPelvisShare = 0.25;
 constexpr double kFootShareMin = 0.2;

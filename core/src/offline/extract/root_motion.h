@@ -11,7 +11,8 @@ namespace stridewire {
 struct GroundTravel {
   std::vector<DVec3> position_m;  ///< Horizontal path of the ground, one point per frame.
   double length_m = 0.0;          ///< Length of the path at the speed of a walk.
-  double left_share = 0.0;        ///< Share of `length_m` during which the left foot supports.
+  /// Fraction of `length_m` during which the left foot is the supporting foot.
+  double left_share = 0.0;
 };
 
 /// Measures the travel of the ground. It assumes level ground, so it is valid only for figures

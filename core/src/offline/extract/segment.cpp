@@ -14,7 +14,8 @@ namespace stridewire {
 namespace {
 
 constexpr double kHalfSupportDefaultS = 0.08;
-// Least part of the usual half support that must remain where the recording cuts it off.
+// If a recording begins or ends during a double support, at least this fraction of the usual half
+// support must be left.
 constexpr double kHalfSupportMinShare = 0.5;
 
 // A swing of a foot with the contacts before and after it.
@@ -25,7 +26,7 @@ struct Swing {
   const Contact* fixed = nullptr;  // Contact of the other foot that contains the swing, or null.
   int before_index = 0;
   int fixed_index = -1;
-  FrameRange frames;  // The foot is off the ground.
+  FrameRange frames;  // Frames in which the foot is off the ground.
 
   [[nodiscard]] int SupportBegin() const {
     return std::max(before->frames.begin, fixed->frames.begin);

@@ -13,9 +13,9 @@ struct SegmentOptions {
   double standing_max_s = 0.4;        ///< Longest part of a standing phase that belongs to a step.
   double swing_min_s = 0.1;           ///< A swing takes at least this time.
   double swing_max_s = 2.0;           ///< A swing takes at most this time.
-  double moved_min_m = 0.04;          ///< A step moves the foot at least this far, or
+  double moved_min_m = 0.04;          ///< A step moves the foot by at least this, or
   double turned_min_rad = 0.09;       ///< turns the foot by at least this angle.
-  double support_slide_max_m = 0.12;  ///< Largest motion of the fixed ball during the swing.
+  double support_slide_max_m = 0.12;  ///< Largest motion of the other foot's ball in a swing.
   double flight_min_s = 0.15;         ///< Shortest flight of a jump.
   double flight_max_s = 1.0;          ///< Longest flight of a jump.
   double feet_apart_max_s = 0.15;     ///< In a jump, both feet leave and land within this time.

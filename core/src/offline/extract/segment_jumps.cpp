@@ -23,8 +23,9 @@ namespace {
 constexpr double kFallMin_m_s2 = -15.0;
 constexpr double kFallMax_m_s2 = -5.0;
 constexpr double kGravity_m_s2 = -9.81;
-// A wrong frame rate is the likely cause if the pelvis follows a parabola of at least this height,
-// with deviations below this share of it.
+// If the pelvis follows a parabola at another acceleration than that of a fall, the frame rate is
+// probably wrong. The parabola must be at least kArchMinM high, with deviations below
+// kArchResidualShare of its height.
 constexpr double kArchMinM = 0.02;
 constexpr double kArchResidualShare = 0.05;
 // A figure that hangs on something swings at most this fast and has raised its feet this far.
@@ -33,11 +34,13 @@ constexpr double kHangRiseM = 0.03;
 // A runner moves at least this fast and is in the air for at least this time.
 constexpr double kRunMin_m_s = 1.0;
 constexpr double kRunFlightMinS = 0.04;
-constexpr double kRunFeetApartS = 0.1;  // The feet of a runner leave the ground this much apart.
-constexpr double kPastLowestM = 0.03;   // After this rise, the pelvis has passed its lowest point.
-constexpr double kNextCrouchM = 0.05;   // A later descent by this much begins the next crouch.
-constexpr double kUprightShare = 0.6;   // A standing figure has risen by this share of the crouch.
-constexpr double kNearlyStill = 2.5;    // A standing figure moves at up to this times still_m_s.
+// A runner's other foot has left the ground at least this time before the flight.
+constexpr double kRunFeetApartS = 0.1;
+constexpr double kPastLowestM = 0.03;  // After this rise, the pelvis has passed its lowest point.
+constexpr double kNextCrouchM = 0.05;  // A later descent by this much begins the next crouch.
+constexpr double kUprightShare = 0.6;  // A standing figure has risen by this share of the crouch.
+// A standing figure may move at up to this many times still_m_s.
+constexpr double kNearlyStill = 2.5;
 constexpr double kUnsettledMinS = 0.1;  // Shortest usable support after landing.
 
 // A parabola through the heights of the pelvis.

@@ -60,7 +60,7 @@ std::optional<double> KneeDegrees(const LegRig::Side& side, const LegPose& leg,
   return std::min(to_foot_deg, DegreesBetween(bend, forward - glm::dot(forward, along) * along));
 }
 
-// Heights of the ball and of the lowest point of a sole above level ground.
+// Heights above level ground of the ball of a foot and of the lowest point of its sole.
 struct SoleHeights {
   double ball_m = 0.0;
   double lowest_m = 0.0;

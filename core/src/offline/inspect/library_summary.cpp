@@ -50,9 +50,11 @@ std::string FirstSource(std::string_view source) {
 
 Foot LeftIf(bool is_left) { return is_left ? Foot::kLeft : Foot::kRight; }
 
-// The feet and the body of an example, in its first and last pose.
+// Measurements of an example by which the summary classifies it.
 struct MeasuredExample {
-  DVec3 start_m;  // From the fixed to the moving foot, in the heading frame of its pose.
+  // Vectors from the fixed to the moving foot in the first and in the last pose, each in the
+  // heading frame of its pose.
+  DVec3 start_m;
   DVec3 end_m;
   double turn_deg = 0.0;
   double travelled_m = 0.0;

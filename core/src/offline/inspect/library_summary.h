@@ -46,9 +46,10 @@ struct MissingAbility {
 struct LibrarySummary {
   using Sides = std::array<Ability, 2>;
 
-  ExampleOrigins steps;      ///< All steps.
-  Sides starts;              ///< From feet together to feet apart; length in metres.
-  Sides stops;               ///< From feet apart to feet together; previous stride in metres.
+  ExampleOrigins steps;  ///< All steps.
+  Sides starts;          ///< Steps from feet together to feet apart; length in metres.
+  /// Steps from feet apart to feet together; length of the previous stride in metres.
+  Sides stops;
   Sides strides;             ///< Steps forward; distance between the feet at the end, metres.
   Sides turns;               ///< Steps that turn; degrees, always positive.
   Sides side_steps;          ///< Steps to the side; sideways movement of the foot in metres.
@@ -59,11 +60,11 @@ struct LibrarySummary {
   Ability jumps;             ///< Lengths in metres.
   ValueRange jump_up_m;      ///< Heights of the landing places above the start.
   ValueRange jump_turn_deg;  ///< Turns of the jumps; positive is left.
-  /// Distance of the feet in the stand pose, in the direction of the heading.
+  /// Distance between the feet in the stand pose, measured along the heading.
   double stand_stride_m = 0.0;
   std::vector<MissingAbility> missing;
 
-  /// Feet are together if they are at most this far apart in the direction of the heading.
+  /// Feet are together if the distance between them, measured along the heading, is at most this.
   static constexpr double kTogetherM = 0.12;
   /// Returns true if the feet of the stand pose are together.
   [[nodiscard]] bool has_stand() const { return stand_stride_m <= kTogetherM; }

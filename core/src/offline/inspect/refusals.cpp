@@ -13,7 +13,8 @@
 namespace stridewire {
 namespace {
 
-// Results within this distance are met, whatever their direction.
+// A request whose result is within this distance counts as met, whatever the direction of the
+// error.
 constexpr double kMetM = 0.05;
 
 double Horizontal(const DVec3& v) { return std::hypot(v.x, v.z); }

@@ -19,8 +19,9 @@ struct Refusal {
   /// contain the same names.
   Values asked;
   Values got;
-  double missed_m = 0.0;    ///< Distance between the requested and the actual result.
-  double missed_rad = 0.0;  ///< Angle between their directions or headings; the larger one.
+  double missed_m = 0.0;  ///< Distance between the requested and the actual result.
+  /// Angle between their directions or between their headings, whichever is larger.
+  double missed_rad = 0.0;
   /// One sentence without its subject, the movement: "did not arrive: ...".
   std::string reason;
 };
@@ -32,7 +33,7 @@ struct Refusal {
 /// - Steps: position of the moving foot relative to the fixed foot in the heading after the step,
 ///   direction of the path of the moving foot, and change of heading. With `at`, the footprint.
 /// - Jumps: movement of the base frame in the heading at its start, and change of heading.
-/// - Stands: distance of the feet from their relative positions in the stand pose.
+/// - Stands: how far the relative position of the feet differs from that in the stand pose.
 /// - Heights are compared on level ground only; a terrain determines them itself.
 [[nodiscard]] std::vector<Refusal> FindRefusals(const SynthesisInput& input,
                                                 const Synthesis& synthesis);

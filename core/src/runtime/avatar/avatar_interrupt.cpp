@@ -13,9 +13,9 @@ namespace stridewire {
 
 namespace {
 
-// The swinging foot may land this far behind where it is, in metres.
+// The swinging foot may land this far behind its current position, in metres.
 constexpr double kMaxSwingBackM = 0.06;
-// A foot that has to land early lands this far ahead of where it is, in metres.
+// A foot that has to land early lands this far ahead of its current position, in metres.
 constexpr double kEarlyLandingM = 0.12;
 
 // Returns the request of a step that another request needs. Its plan is never out of reach.

@@ -196,7 +196,8 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
   const auto advance_clock = [&] {
-    // Where no time has passed, the rounded difference may lie one bit before the clock.
+    // If no time has passed, rounding can make the difference smaller than time_s_ by one bit. The
+    // clock must not run backwards.
     time_s_ = std::max(time_s_, end_s - left_s);
   };
   for (;;) {
@@ -250,7 +251,7 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
     SwitchPlanting();
     if (auto plan = PlanClosingStep()) {
       if (is_hurried) plan->max_rate = kHurriedRate;
-      EndIdleMotion();  // The walk may have ended earlier than the delay of its next request.
+      EndIdleMotion();  // The avatar may have begun to idle while the next request was delayed.
       StartInserted(*plan, scratch);
       return true;
     }
@@ -357,7 +358,7 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
     is_walk_step_ = true;
     return;
   }
-  const double speed_m_s = walk_pace_.mean_m_s();  // PopQueue may reset it.
+  const double speed_m_s = walk_pace_.mean_m_s();  // PopQueue may reset walk_pace_.
   const std::uint64_t id = PopQueue();
   walk_ = {};
   walk_pace_ = {};

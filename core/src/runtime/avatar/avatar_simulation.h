@@ -216,7 +216,8 @@ class AvatarSimulation {
     if (is_walk_step_ || request_id_ == 0) return RequestOutcome::kNone;
     return is_cut_short ? RequestOutcome::kReplaced : RequestOutcome::kCompleted;
   }
-  // Time is a sum of ticks, so rounding must not make a delay of whole ticks one tick longer.
+  // time_s_ is a rounded sum of ticks. The margin prevents a delay of whole ticks from lasting one
+  // tick longer.
   [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
   [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
   [[nodiscard]] FootState MeasureFeet() const;
@@ -334,13 +335,13 @@ class AvatarSimulation {
   // Group of the previous movement, or the number of groups after a stand.
   std::size_t last_group_ = 0;
   WalkProgress walk_;   // Progress of the walk at the head of the queue.
-  WalkPace walk_pace_;  // Speed of that walk.
+  WalkPace walk_pace_;  // Speed of the walk at the head of the queue.
   // The queue consists of the elements from index queue_head_ on.
   std::vector<MovementRequest> queue_;
   std::size_t queue_head_ = 0;
   std::vector<AvatarEvent> events_;
   std::size_t max_events_ = kMaxEventsPerAdvance;  // Limit of events_ in this Advance.
-  std::vector<DroppedRequest> dropped_;            // Dropped since the last Advance.
+  std::vector<DroppedRequest> dropped_;  // Requests that were dropped since the last Advance.
   OwnScratch own_scratch_;
 };
 

@@ -49,7 +49,7 @@ struct CardinalBasisFit {
   std::span<const double> sites;
   std::span<const double> pseudo_weights;  ///< [site - n][n]: weights of the pseudoexamples
   std::span<const double> scales;          ///< [d], > 0
-  /// [site]: factors on the dilations, > 0. Empty: all factors are 1.
+  /// [site]: factors by which the dilations are multiplied, > 0. Empty: all factors are 1.
   std::span<const double> radius_factors;
   /// If true, every dilation is the distance to the nearest other site of either sort, as in the
   /// paper.

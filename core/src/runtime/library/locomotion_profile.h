@@ -17,7 +17,8 @@ inline constexpr double kFeetApartForwardM = 0.12;
 struct LocomotionProfile {
   double step_m = 0.5;     ///< Comfortable step forward, from foot to foot.
   double longest_m = 0.6;  ///< Longest step forward.
-  /// Shortest step forward that both feet have; at most step_m. 0 if both can close.
+  /// Shortest forward step that the library has for both feet, at most step_m. It is 0 if either
+  /// foot can step beside the other.
   double shortest_m = 0.0;
   double back_m = 0.0;    ///< Longest comfortable step backward.
   double width_m = 0.15;  ///< Sideways distance between the feet in a straight walk.
@@ -27,7 +28,7 @@ struct LocomotionProfile {
   /// True if the stand pose has one foot more than 0.12 m ahead of the other, because the captures
   /// contain no stand. A walk then begins and ends in a stride.
   bool stands_in_stride = false;
-  bool has_climbs = false;  ///< Some group of steps has the parameter end_y.
+  bool has_climbs = false;  ///< True if a group of steps has the parameter end_y.
 
   /// Returns the foot that stands behind in the stand pose.
   [[nodiscard]] Foot RearFoot() const {

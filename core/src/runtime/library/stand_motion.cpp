@@ -100,8 +100,8 @@ double WeightAt(double time_s) {
 
 // The joints above the legs, found by their positions in the stand pose.
 struct UpperBody {
-  std::vector<std::size_t> spine;  // From above the root up to the joint that carries the arms.
-  std::vector<std::size_t> neck;   // From there up to the head.
+  std::vector<std::size_t> spine;  // Joints above the root, up to the one that carries the arms.
+  std::vector<std::size_t> neck;   // Joints above the spine, up to the head.
   struct Arm {
     std::size_t collar = 0;
     std::size_t shoulder = 0;  // Equal to `collar` if the arm has no separate collar bone.
@@ -289,11 +289,12 @@ class IdleGenerator {
   const Skeleton& skeleton_;
   const LegRig& rig_;
   const Pose& stand_;
-  std::vector<Vec3> positions_;  // Of the joints in the stand pose.
+  std::vector<Vec3> positions_;  // Positions of the joints in the stand pose.
   std::vector<Quat> world_;
   Pose pose_;
   UpperBody body_;
-  std::array<DVec3, 2> ankles_m_;        // [foot]: in the stand pose, relative to the base frame.
+  // [foot]: position of the ankle in the stand pose, relative to the base frame.
+  std::array<DVec3, 2> ankles_m_;
   std::array<Quat, 2> ankle_rotations_;  // [foot]
   std::array<double, 2> longest_m_{};    // [foot]: largest distance from hip to ankle.
   double hip_height_m_ = 1.0;

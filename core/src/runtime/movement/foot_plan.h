@@ -22,9 +22,9 @@ struct FootTrajectory {
 
   Footprint from;  ///< Footprint at the start.
   Footprint to;    ///< Footprint at the end.
-  /// Leaves `from` at this time; kNever: stands throughout the movement.
+  /// Time at which the foot leaves `from`; kNever: it stands throughout the movement.
   double release_s = kNever;
-  double land_s = kNever;  ///< Stands on `to` from this time on.
+  double land_s = kNever;  ///< Time at which the foot comes to rest on `to`.
   DVec3 release_offset_m = DVec3(0.0);
   /// Turn that the heading lock adds to the heading of the foot at release.
   double release_turn_rad = 0.0;
@@ -76,7 +76,7 @@ struct FootResidual {
 /// pose fades out, which is too abrupt if the place is far away or if the root moves at another
 /// speed.
 struct RootApproach {
-  DVec3 offset_m = DVec3(0.0);    ///< Distance that the rotations of the legs move the root.
+  DVec3 offset_m = DVec3(0.0);    ///< Displacement of the root by the rotations of the legs.
   DVec3 offset_m_s = DVec3(0.0);  ///< Its velocity at the start of the movement.
   double over_s = 0.0;            ///< If less than Movement::ease_out_s, nothing is added.
 };

@@ -38,10 +38,10 @@ constexpr double kMostlySettled = 0.7;
 // Sideways distances between the balls of the feet. A swinging foot that would pass the standing
 // foot closer than kMinPassingWidthM is pushed outward by up to kMaxPushM. This is checked while
 // the feet are within kPassingLengthM of each other in the walking direction. A step that starts or
-// lands closer than kCrossingWidthM crosses the legs intentionally.
+// lands closer than kCrossingWidthM crosses the legs intentionally. If a request does not specify
+// the sideways distance, the foot lands at least kMinLandingWidthM from the other foot.
 constexpr double kMinPassingWidthM = 0.11;
-constexpr double kMinLandingWidthM =
-    0.05;  // Feet do not land closer than this sideways, unless the request specifies the side.
+constexpr double kMinLandingWidthM = 0.05;
 constexpr double kPassingLengthM = 0.2;
 constexpr double kCrossingWidthM = 0.04;
 constexpr double kMaxPushM = 0.08;

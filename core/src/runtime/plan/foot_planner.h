@@ -40,10 +40,10 @@ inline constexpr double kMaxFootTurnRad = 0.35;
 /// Largest shift of the root for a step that ends in a stand.
 inline constexpr double kMaxRootShiftM = 0.4;
 
-/// What a plan starts from, and where it is written.
+/// Input and output of PlanFeet.
 struct FootPlanJob {
   const MotionLibrary& library;
-  const FootLocks& locks;  ///< Where the feet stand at the start.
+  const FootLocks& locks;  ///< Positions of the feet at the start.
   BlendSource source;
   FootPlanScratch& scratch;  ///< Its cache may only contain rows of this movement.
   PoseSpan pose;             ///< Scratch with one rotation per joint.

@@ -13,7 +13,7 @@ struct LandingConditions {
   bool has_terrain = false;  ///< The terrain determines the height of the landing place.
 };
 
-/// What a planned step or jump will reach, and how far that is from its request.
+/// The predicted result of a planned step or jump, and its difference from the request.
 struct RequestError {
   RequestTarget reached;    ///< Result of the step or jump, in the terms of its request.
   double distance_m = 0.0;  ///< Distance between the landing places, >= 0.

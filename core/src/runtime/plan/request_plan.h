@@ -20,7 +20,7 @@ struct FootState {
   }
 };
 
-/// What a step or jump should reach.
+/// Target of a step or jump.
 struct RequestTarget {
   /// Steps: vector from the fixed to the moving foot at the end, in the heading after the step.
   /// Jumps: path of the base frame, in the heading before the jump.

@@ -31,7 +31,9 @@ struct WalkProgress {
   int steps_without = 0;  ///< Number of steps since the walk last made progress.
   /// Least remaining effort so far (WalkSteering::EffortM).
   double least_effort_m = std::numeric_limits<double>::infinity();
-  bool is_detour = false;  ///< Ground that supports no foot has changed a step of this walk.
+  /// True if a step of this walk was changed because the ground at its footprint does not support a
+  /// foot.
+  bool is_detour = false;
   /// [foot]: the last step of this foot was aimed at its place at the goal.
   std::array<bool, 2> is_aimed{};
 };
@@ -69,7 +71,7 @@ struct WalkDecision {
 };
 
 /// Limits of a walk. It ends after kMaxStepsWithout steps without progress, or after
-/// kMaxDetourSteps if it makes a detour around ground that supports no foot.
+/// kMaxDetourSteps if it makes a detour around ground that does not support a foot.
 inline constexpr int kMaxWalkSteps = 10'000;
 inline constexpr int kMaxStepsWithout = 2;
 inline constexpr int kMaxDetourSteps = 16;

@@ -38,8 +38,9 @@ constexpr double kNearM = 0.5;
 // Effort of a metre sideways or backward.
 constexpr double kSideEffort = 1.5;
 
-// Goals further away than this are reached by walking, not by stepping sideways or backward.
-// Libraries without steps backward of at least kBackM have to combine other steps.
+// An avatar turns and walks forward to goals further away than kMaxShiftM. It may reach nearer
+// goals with steps sideways or backward. For libraries whose longest step backward is shorter than
+// kBackM the limit is kMaxShiftWithoutBackM, because they have to combine other steps.
 constexpr double kMaxShiftM = 2.0;
 constexpr double kMaxShiftWithoutBackM = 1.3;
 constexpr double kBackM = 0.2;
@@ -269,7 +270,7 @@ bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   const double shifting_s = std::max(
       {kQuickStepS + along_s, kQuickStepS * 2.0 * PartCount(std::fabs(local.x), kLongSideStepM),
        kQuickStepS + turning_s(turn_rad, 0.0)});
-  // Such libraries often do not have side steps, which are short, either.
+  // Libraries without short steps or steps backward often have no side steps either.
   const bool may_lack_steps = profile_.shortest_m > kShortestStepM || profile_.back_m < kBackM;
   return shifting_s <= walking_s - (may_lack_steps ? kStrideMarginS : 0.0);
 }

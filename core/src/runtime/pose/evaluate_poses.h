@@ -30,8 +30,8 @@ class GridCache {
                                            int point);
 
  private:
-  // This is enough for all points of most movements. If rows have the maximum length, only the four
-  // points around a time fit.
+  // Maximum number of cached grid points. It is enough for all points of most movements. If rows
+  // have the maximum length, only the four points around a time fit.
   static constexpr std::size_t kMaxSlots = 32;
   static constexpr std::size_t kRowsFloats = 4 * kMaxRowFloats;
   std::size_t row_floats_;

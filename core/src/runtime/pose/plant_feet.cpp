@@ -185,8 +185,8 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                                    WrapAngle(turn_of(planned[1]) - turn_of(planned[0])));
     residual.over_s = movement.ease_out_s;
     if (is_planted) {
-      // For a standing foot, keeps only the residuals of its height and of the turn that it has
-      // while its heel is up.
+      // The ball of a standing foot must stay on its footprint, so its horizontal residual is zero.
+      // The residual of the turn affects only a foot whose heel is up.
       residual.offset_m.x = residual.offset_m.z = residual.offset_m_s.x = residual.offset_m_s.z =
           0.0;
       const double velocity_m_s =

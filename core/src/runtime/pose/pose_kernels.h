@@ -78,11 +78,12 @@ struct RotationBlend {
   const float* row;  ///< Blended row in the layout of GridLayout
   std::size_t joint_count;
   const float* difference;  ///< [joint] x y z w: difference pose, or null if there is none.
-  /// Factor on the difference pose, in [0, 1]: r := r slerp(1, difference, fraction).
+  /// Fraction of the difference pose to add, in [0, 1]: r := r slerp(1, difference, fraction).
   float fraction;
   /// [joint] x y z: velocity of the difference pose as rotation vectors per second, or null.
   const float* velocity;
-  /// Factor on the velocity: r := r * (rotation by the vector seconds * velocity).
+  /// Time by which the velocity is multiplied: r := r * (rotation by the vector seconds *
+  /// velocity).
   float seconds;
 };
 

@@ -17,7 +17,7 @@ namespace stridewire {
 /// sum is the limit.
 inline constexpr double kMaxCorrectedWeightSum = 2.5;
 
-/// Conditions under which a correction stops, and limits on its weights.
+/// Conditions under which a correction stops, and limits on the resulting weights.
 struct CorrectionLimits {
   int max_iterations = 3;
   double tolerance_m = 1e-5;  ///< Stop when the error is at most this.
@@ -36,7 +36,8 @@ inline constexpr double kSparseWeightSum = 1.4;
 /// Groups with height parameters and fewer than four captured examples per coefficient of the
 /// linear part of the weights (d + 1) have smaller limits on weights. Otherwise, requests near the
 /// border of their hull would amplify the individual variation of the examples, and knees and
-/// pelvis would jolt. What the weights miss, planting corrects.
+/// pelvis would jolt. If the movement then misses its parameters, planting still puts the feet on
+/// their footprints.
 [[nodiscard]] CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group);
 
 /// Result of a correction.

@@ -23,7 +23,7 @@ struct Section {
 
 [[nodiscard]] std::string SectionHtml(const Section& section);
 
-// What the library can do, and what is missing.
+// Describes what the library can do, and what is missing.
 [[nodiscard]] Section SummarySection(const LibrarySummary& summary);
 
 [[nodiscard]] Section SelfCheckSection(const SelfCheck& check);

@@ -225,7 +225,7 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
     auto figure = WalkFigure(library, walk.name, walk.caption, walk.requests);
     if (figure) {
       walks.figures.push_back(*std::move(figure));
-    } else {  // The library lacks a movement that this walk needs.
+    } else {  // The library does not contain a movement that this walk needs.
       walks.text += " Not possible: " + walk.name + " (" + Describe(figure.error()) + ").";
     }
   }
