@@ -19,7 +19,9 @@ constexpr Entry kEntries[] = {
     {STRIDEWIRE_VERSION_MISMATCH, "version_mismatch",
      "Client and server, or header and library, have different versions."},
     {STRIDEWIRE_UNAUTHORISED, "unauthorised", "The auth token is missing or not sufficient."},
-    {STRIDEWIRE_NOT_ALLOWED, "not_allowed", "Only a controller may do this."},
+    {STRIDEWIRE_NOT_ALLOWED, "not_allowed",
+     "The command needs the role controller, or a region is not the only observation of its "
+     "world."},
     {STRIDEWIRE_NOT_JOINED, "not_joined", "The world is not joined."},
     {STRIDEWIRE_NO_SUCH_WORLD, "no_such_world", "There is no such world."},
     {STRIDEWIRE_NO_SUCH_AVATAR, "no_such_avatar", "There is no such avatar in this world."},

@@ -23,7 +23,7 @@ struct CompactPlan {
 /// A block of CompactCodec::kBlock poses. The arrays are those of CompactCodec::Block.
 struct CompactWork {
   std::size_t count;       // Number of valid poses.
-  bool are_unit;           // CompactCodec::SoaPoses::are_unit
+  bool are_unit;           // Value of CompactCodec::SoaPoses::are_unit.
   const float* roots_m;    // [x y z][pose]
   const float* rotations;  // [joint][x y z w][pose]
   float* errors;           // [joint][x y z][pose]

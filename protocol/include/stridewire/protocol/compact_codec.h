@@ -16,9 +16,10 @@ namespace stridewire::protocol {
 /// is valid. Fails with kOutOfRange, kMalformed or kLimitExceeded; `index` is the joint.
 [[nodiscard]] Status CheckRotationQuantizations(std::span<const RotationQuantization> codes);
 
-/// Checks the joints of PoseDetail::kReduced: ascending, with the root and the parent of every
-/// joint. Fails with kShapeMismatch if there are more than `parents`, and with kMalformed; `index`
-/// is the position in `joints`.
+/// Checks the joints of PoseDetail::kReduced. `parents` contains the parent of each joint of the
+/// skeleton. `joints` must be ascending, and contain the root and the parents of all its joints.
+/// Fails with kShapeMismatch if there are more joints than in the skeleton. All other errors are
+/// kMalformed, and Error::index is the position in `joints`.
 [[nodiscard]] Status CheckReducedJoints(std::span<const std::uint16_t> joints,
                                         std::span<const std::int16_t> parents);
 
@@ -40,10 +41,11 @@ struct CompactJoint {
   bool is_omitted = false;
 };
 
-/// The part of one number that a 32-bit word of a pose contains.
+/// Describes which bits of a number a 32-bit word of a pose contains.
 struct CompactPart {
   std::uint16_t row = 0;  ///< Index of the number among the numbers of a pose.
-  std::int8_t left = 0;   ///< Bits by which the number is shifted left, or right if negative.
+  /// Number of bits by which to shift the number left; negative: to the right.
+  std::int8_t left = 0;
   bool ends_word = false;
 };
 
@@ -110,8 +112,8 @@ class CompactCodec {
 
    private:
     friend class CompactCodec;
-    // The same number of each pose of a block. Aligned to a cache line, so that no vector crosses
-    // two lines.
+    // One of the numbers of a pose, for all poses of a block. Aligned to a cache line, so that no
+    // vector crosses two lines.
     struct alignas(64) Floats {
       float of[kBlock];
     };

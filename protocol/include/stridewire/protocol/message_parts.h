@@ -17,12 +17,12 @@
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/status_code.h"
 
-/// Parts of messages, and the messages whose structs are not generated: requested movements are a
-/// variant, and batches and movement records have functions. Include messages.h instead.
+/// Structs of messages that the build does not generate, because requested movements are a variant,
+/// and batches and movement records have member functions. Include messages.h instead.
 namespace stridewire::protocol {
 
 using WorldId = std::uint32_t;   ///< Assigned by the server, never 0.
-using AvatarId = std::uint32_t;  ///< Unique within its world, never 0.
+using AvatarId = std::uint32_t;  ///< Id of an avatar, unique within its world and never 0.
 /// Chosen by the client; unique within its session, never 0.
 using SubscriptionId = std::uint32_t;
 using RequestId = std::uint64_t;  ///< Chosen by the client. 0: a step that the server inserted.
@@ -91,8 +91,9 @@ struct WalkMovement {
 
 /// One requested movement of one avatar.
 struct RequestItem {
-  AvatarId avatar = 0;       ///< Not 0.
-  RequestId request_id = 0;  ///< Chosen by the client, not 0. Events repeat it.
+  AvatarId avatar = 0;  ///< Not 0.
+  /// Id that the client chooses, not 0. Events of the request contain it.
+  RequestId request_id = 0;
   std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
   Interrupt interrupt = Interrupt::kNone;
   bool operator==(const RequestItem&) const = default;
@@ -190,7 +191,9 @@ struct Movements {
   std::uint16_t parts = 1;  ///< Number of messages that contain the changes of this step.
   /// Number of steps that follow before the poses of `tick` are displayed.
   std::uint16_t more_steps = 0;
-  std::uint64_t step = 0;  ///< Step number of the shard. A gap makes all its avatars unknown.
+  /// Step number of the shard. If numbers are missing, the client no longer knows the states of the
+  /// shard's avatars.
+  std::uint64_t step = 0;
   std::uint64_t tick = 0;
   double server_time_s = 0.0;  ///< Server time of the tick.
   /// True: the records are states after `step`. False: the records are changes in `step`.

@@ -21,7 +21,8 @@ namespace stridewire::protocol {
 /// Borrows the batch and the codec. Never allocates.
 class PoseBatchReader {
  public:
-  /// `codec` is CompactCodecs::Find of the batch's mode, which is null if the batch is not compact.
+  /// `codec` is the codec of the batch's mode (CompactCodecs::Find). It may be null if the batch is
+  /// not compact.
   PoseBatchReader(const PoseBatch& batch, const CompactCodec* codec)
       : batch_(batch), codec_(codec), compact_bytes_(CompactPoseBytes(batch).value_or(0)) {}
 

@@ -62,7 +62,8 @@ class PoseRows {
   Avatars avatars_;
   std::vector<std::uint8_t> flags_;
   std::vector<std::size_t> begins_;
-  // It may be longer than the rows together: it never shrinks, so that it need not be cleared.
+  // The encoded rows. The array may be longer than all rows together: it never shrinks, because
+  // resizing it would clear new bytes.
   std::vector<std::byte> bytes_;
   std::size_t pose_count_ = 0;
 

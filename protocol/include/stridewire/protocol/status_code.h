@@ -15,7 +15,9 @@ enum class StatusCode : std::uint16_t {
   kUnsupported = 102,
   kVersionMismatch = 103,
   kUnauthorised = 104,  ///< The auth token is missing or does not grant enough rights.
-  kNotAllowed = 105,    ///< Only a controller may send this command.
+  /// An observer commanded avatars, or a subscription with a region is not the only one of its
+  /// world.
+  kNotAllowed = 105,
   kNotJoined = 106,
   kNoSuchWorld = 107,
   kNoSuchAvatar = 108,
