@@ -34,7 +34,7 @@ struct CrowdPose {
   std::vector<protocol::AvatarId> avatars;
   std::vector<std::uint8_t> flags;  ///< CrowdFlags of each avatar.
   std::vector<Vec3> roots_m;        ///< World position of each root.
-  std::vector<Quat> rotations;      ///< `joint_count` per avatar.
+  std::vector<Quat> rotations;      ///< Joint rotations, `joint_count` per avatar.
 
   void Resize(std::size_t count, std::size_t joints) {
     joint_count = joints;

@@ -38,7 +38,7 @@ struct LibraryTask {
 ///                                                                    `--> error
 class LibraryFetch {
  public:
-  /// Small, so that a piece does not delay the poses behind it for long.
+  /// Size of a piece. Pieces are small, so that they do not delay poses for long.
   static constexpr std::uint32_t kPieceBytes = 256u << 10;
 
   explicit LibraryFetch(std::string folder) : folder_(std::move(folder)) {}

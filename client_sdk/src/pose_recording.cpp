@@ -95,7 +95,8 @@ void PoseRecording::DropOld() {
     Discard(stream, tick);
     bytes_ -= tick.bytes;
     stream.ticks.pop_front();
-    if (stream.ticks.empty()) streams_.erase(oldest);  // Frees the decoded poses, too.
+    // This also frees the decoded poses of the stream.
+    if (stream.ticks.empty()) streams_.erase(oldest);
   }
 }
 

@@ -72,7 +72,7 @@ class PoseRecording {
   struct Decoded {
     const Tick* source = nullptr;  ///< Null: the buffers contain nothing.
     std::uint64_t last_use = 0;
-    CrowdPose poses;  ///< In ascending order of the avatars.
+    CrowdPose poses;  ///< Poses in ascending order of avatar ids.
     [[nodiscard]] bool Find(protocol::AvatarId avatar, std::size_t& index) const;
     [[nodiscard]] ConstPoseSpan pose(std::size_t i) const;
   };
@@ -80,7 +80,8 @@ class PoseRecording {
     std::deque<Tick> ticks;
     std::vector<std::unique_ptr<Decoded>> decoded;
   };
-  /// Ticks of a stream around a time. Pointers are null where no continuous tick exists.
+  /// The ticks of a stream before and after a time, between which poses are interpolated. A pointer
+  /// is null if there is no such tick, or if a discontinuity lies between it and the time.
   struct Neighbours {
     const Decoded* start = nullptr;
     bool exact = false;  ///< True if `start` is exactly at the time; the others are then null.

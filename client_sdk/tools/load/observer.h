@@ -111,7 +111,8 @@ class Observer final : public Session {
                    std::int64_t now_ns);
   void OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes, std::int64_t now_ns);
   void TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns);
-  /// Returns how many measured poses before `tick` are excused.
+  /// Returns how many poses of an avatar are missing before `tick` because the connection was lost,
+  /// as far as they were due in the measured time and within the time allowed for reconnecting.
   [[nodiscard]] std::uint64_t ExcusedBefore(const World& world, const Seen& seen,
                                             std::uint64_t tick) const;
   /// Checks that the tick of a batch increases. Returns false if the batch must be ignored.

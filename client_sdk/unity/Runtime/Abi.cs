@@ -152,7 +152,8 @@ namespace Stridewire
         /// `accepted` is the number of the others, which were executed.</summary>
         Reply = 6,
         /// <summary>Uses command, item_index, avatar, request_id, status, text. Reports an item
-        /// that the server refused, or the avatar id that it chose. Precedes the REPLY.</summary>
+        /// that the server refused, or the id that it chose for a spawned avatar. Precedes the
+        /// REPLY.</summary>
         Item = 7,
         /// <summary>Uses dropped_batches, dropped_events. This client reads too slowly.</summary>
         Lagging = 8,
@@ -225,7 +226,7 @@ namespace Stridewire
     {
         /// <summary>No pose is known for that time. Other fields are 0.</summary>
         Missing = 0,
-        /// <summary>Interpolated between two received poses, or exactly one.</summary>
+        /// <summary>Interpolated between two received poses, or equal to a received pose.</summary>
         Interpolated = 1,
         /// <summary>The last received pose before that time. The next one has not arrived, or
         /// follows a discontinuity.</summary>

@@ -2,8 +2,9 @@ using System;
 
 namespace Stridewire
 {
-    /// <summary>A joined world. Its commands return their numbers, which Event.Command repeats.
-    /// Requests return their ids, which Event.RequestId repeats.</summary>
+    /// <summary>A joined world. Each command returns its number. Events that it causes contain this
+    /// number as Event.Command. Each request of a movement returns its id, which events of the
+    /// movement contain as Event.RequestId.</summary>
     public sealed unsafe class World
     {
         private readonly Client client;
@@ -16,7 +17,7 @@ namespace Stridewire
             JoinCommand = command;
         }
 
-        /// <summary>Number of the world, which Event.World repeats.</summary>
+        /// <summary>Number of the world. Events of the world contain it as Event.World.</summary>
         public uint Id { get; private set; }
 
         public string Name { get; private set; }

@@ -3,10 +3,11 @@ import type {LibraryCache} from './client_types';
 const maxLibraries = 16;
 const maxBytes = 64 * 2 ** 20;
 
-/** Properties of a stored library. */
-interface Use {
+/** Properties of a stored library, in the object store `uses`. */
+interface CacheEntry {
   readonly hash: string;
   readonly bytes: number;
+  /** Time at which the library was last loaded or stored, in milliseconds since 1970. */
   readonly usedMs: number;
 }
 
@@ -18,37 +19,44 @@ class IndexedDbCache implements LibraryCache {
 
   async load(hash: string): Promise<Uint8Array | null> {
     let file: unknown = null;
-    await this.transact((files, uses) => {
+    await this.transact((files, entries) => {
       files.get(hash).onsuccess = ({target}) => {
         file = (target as IDBRequest).result;
-        if (file instanceof Uint8Array) uses.put(useOf(hash, file));
+        if (file instanceof Uint8Array) entries.put(makeEntry(hash, file));
       };
     });
     return file instanceof Uint8Array ? file : null;
   }
 
+  /**
+   * Stores a library. If the cache then exceeds its limits, removes the libraries that were not
+   * used for the longest time. Does not store files of more than 64 MiB.
+   */
   async store(hash: string, file: Uint8Array): Promise<void> {
     if (file.length > maxBytes) return;
-    await this.transact((files, uses) => {
+    await this.transact((files, entries) => {
       files.put(file, hash);
-      uses.put(useOf(hash, file));
-      uses.getAll().onsuccess = ({target}) => {
+      entries.put(makeEntry(hash, file));
+      entries.getAll().onsuccess = ({target}) => {
         const newestFirst =
-            (target as IDBRequest<Use[]>).result.sort((a, b) => b.usedMs - a.usedMs);
+            (target as IDBRequest<CacheEntry[]>).result.sort((a, b) => b.usedMs - a.usedMs);
         let total = 0;
-        newestFirst.forEach((use, i) => {
-          total += use.bytes;
-          if (use.hash === hash || (i < maxLibraries && total <= maxBytes)) return;
-          files.delete(use.hash);
-          uses.delete(use.hash);
+        newestFirst.forEach((entry, i) => {
+          total += entry.bytes;
+          if (entry.hash === hash || (i < maxLibraries && total <= maxBytes)) return;
+          files.delete(entry.hash);
+          entries.delete(entry.hash);
         });
       };
     });
   }
 
-  /** Runs a transaction on both stores. Rejects if it fails, for example for lack of disk space. */
+  /**
+   * Runs a transaction on both object stores. Rejects if it fails, for example because the disk is
+   * full.
+   */
   private async transact(
-      work: (files: IDBObjectStore, uses: IDBObjectStore) => void): Promise<void> {
+      work: (files: IDBObjectStore, entries: IDBObjectStore) => void): Promise<void> {
     const database = await (this.opened ??= this.open());
     await new Promise<void>((resolve, reject) => {
       const transaction = database.transaction(['files', 'uses'], 'readwrite');
@@ -67,7 +75,8 @@ class IndexedDbCache implements LibraryCache {
       };
       request.onsuccess = () => {
         const database = request.result;
-        // The user may delete the data, and a newer version of the page may change the stores.
+        // Gives the connection up when the user deletes the data, or when a newer version of the
+        // page has to change the object stores. The next transaction opens the database again.
         database.onclose = database.onversionchange = () => {
           database.close();
           this.opened = null;
@@ -82,18 +91,18 @@ class IndexedDbCache implements LibraryCache {
   }
 }
 
-function useOf(hash: string, file: Uint8Array): Use {
+function makeEntry(hash: string, file: Uint8Array): CacheEntry {
   return {hash, bytes: file.length, usedMs: Date.now()};
 }
 
 let shared: LibraryCache | null = null;
 
-/** Returns the cache of this page; null where IndexedDB is missing or not allowed. */
+/** Returns the cache that all clients of this page share; null if the page cannot use IndexedDB. */
 export function defaultLibraryCache(): LibraryCache | null {
   try {
     if (typeof indexedDB === 'object') shared ??= new IndexedDbCache(indexedDB);
   } catch {
-    // Pages with an opaque origin must not access IndexedDB.
+    // In pages with an opaque origin, for example sandboxed frames, reading `indexedDB` throws.
   }
   return shared;
 }

@@ -89,7 +89,7 @@ class Native {
   /** The text that the last call has set. */
   get text(): string {
     const {results} = this;
-    // A copy, because browsers do not decode memory that can grow.
+    // The text is copied first, because browsers do not decode text in memory that can grow.
     const at = results[textAt]!;
     return decoder.decode(this.memory.slice(at, at + results[textBytes]!));
   }

@@ -488,8 +488,9 @@ export class Session {
       if (request === 0) return;
       const hash = native().text;
       if (request === 1) {
-        // The promises below also handle exceptions of the cache.
-        // Several timers, because a cache cannot answer while a page is busy.
+        // The promises below also handle exceptions of the cache. The timeout consists of several
+        // short timers: while a page is busy, a cache cannot answer, and only one of the timers can
+        // elapse.
         let timer: ReturnType<typeof setTimeout>;
         const wait = (seconds: number): void => {
           if (seconds === 0) this.onLibrary(hash, null);
@@ -557,7 +558,7 @@ export class Session {
           this.detach();
           break;
         case eventTypes.reply: {
-          // The first reply belongs to the message; others follow from it.
+          // Only the first reply belongs to the message. Replies after it concern other commands.
           const reply = type === MessageType.Reply && !replied ? read() as ReplyMessage : undefined;
           replied = true;
           const pending = this.pending.get(command);

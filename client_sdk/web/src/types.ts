@@ -321,7 +321,7 @@ export interface CurrentMovement {
   readonly easeOutS: number;
   /** Parameters as requested. */
   readonly requested: Parameters;
-  /** Parameters that the avatar carries out. */
+  /** Parameters of the synthesized movement. */
   readonly applied: Parameters;
   /** True if the applied parameters lie outside the range of the recorded examples. */
   readonly extrapolated: boolean;
@@ -419,7 +419,7 @@ export interface WorldEvent {
   readonly group: number;
   /** Started: parameters as requested. */
   readonly requested: Parameters;
-  /** Started: parameters that the avatar carries out. */
+  /** Started: parameters of the synthesized movement. */
   readonly applied: Parameters;
   /** Started: the applied parameters lie outside the range of the recorded examples. */
   readonly extrapolated: boolean;

@@ -208,8 +208,9 @@ STRIDEWIRE_EXPORT(check_frame) bool CheckFrame(std::size_t bytes, bool from_clie
       .has_value();
 }
 
-/// Encodes the message in the frame in `input` again, as the native libraries do, and returns the
-/// size of the frame. Returns 0 and sets the text if it is invalid. results: 0 the address.
+/// Decodes the frame in `input`, encodes its message as the native libraries do, and returns the
+/// size of the new frame in bytes. results: 0 the address of the new frame. If `input` contains no
+/// valid frame, returns 0 and sets the text.
 STRIDEWIRE_EXPORT(encode_frame) std::size_t EncodeFrame(std::size_t bytes, bool from_client) {
   static std::vector<std::byte> frame;
   frame.clear();
@@ -225,8 +226,9 @@ STRIDEWIRE_EXPORT(encode_frame) std::size_t EncodeFrame(std::size_t bytes, bool 
 }
 
 /// Decodes the poses of a batch. `input` contains the frame of the WorldInfo of its world, and then
-/// the frame of the batch. Only compact poses need the former, which may have no bytes. Returns the
-/// number of poses, or -1 and sets the text if something is invalid. results: as in sample_all.
+/// the frame of the batch. The WorldInfo is necessary for compact poses only. Without it,
+/// `info_bytes` is 0. Returns the number of poses, or -1 and sets the text if something is invalid.
+/// results: as in sample_all.
 STRIDEWIRE_EXPORT(decode_poses)
 std::int32_t DecodePoses(std::size_t info_bytes, std::size_t bytes) {
   static CrowdPose crowd;

@@ -160,14 +160,14 @@ stridewire_status stridewire_client_last_error(stridewire_client* client, char* 
 
 // ------------------------------------------------------------------------------------ commands
 //
-// A command is checked, queued for the network thread and assigned a number, which is stored in
-// `command` unless that is NULL. The call returns at once. When the server has answered, the event
-// STRIDEWIRE_EVENT_REPLY reports the result with the same number. If the checks fail, the call
-// fails and nothing is sent.
+// A call checks the command, assigns it a number, queues it for the network thread and returns at
+// once. It stores the number in `command` unless that is NULL. When the server has answered, the
+// event STRIDEWIRE_EVENT_REPLY reports the result with the same number. If the checks fail, the
+// call fails and nothing is sent.
 //
 // All commands can fail with INVALID_ARGUMENT, OUT_OF_RANGE, COMMANDS_FULL, CLOSED (the client is
 // idle or closed), NO_SUCH_WORLD (unknown world number) and NOT_JOINED (the server refused the
-// world, or the client left it).
+// join, or the client has left the world).
 
 /// Role of a client in a world.
 typedef enum stridewire_role {
@@ -243,8 +243,9 @@ typedef enum stridewire_interrupt {
 
 /// A requested movement. A movement type ignores the fields of other types.
 typedef struct stridewire_movement {
-  uint32_t avatar;      ///< Id of the avatar, not 0.
-  uint64_t request_id;  ///< Chosen by the application, not 0. Events repeat it.
+  uint32_t avatar;  ///< Id of the avatar, not 0.
+  /// Id that the application chooses, not 0. Events of the request contain it.
+  uint64_t request_id;
   stridewire_movement_type type;
   stridewire_foot foot;  ///< Step: the moving foot.
   /// Step: forward distance between the feet at its end, in metres. Jump: forward distance, in
@@ -410,7 +411,7 @@ typedef struct stridewire_region {
   const stridewire_pose_detail* ring_details;
 } stridewire_region;
 
-/// Which poses and events a client receives from a world.
+/// Determines which poses and events a client receives from a world.
 typedef struct stridewire_observation {
   stridewire_pose_mode mode;
   uint16_t every_n_ticks;  ///< Interval of poses in ticks, 1 to 3600.
@@ -421,8 +422,8 @@ typedef struct stridewire_observation {
   size_t avatar_count;
   /// Detail of the poses. Other values than 0 require STRIDEWIRE_QUANTISED.
   stridewire_pose_detail detail;
-  /// Observes the avatars inside a region. NULL: none. `avatars` must then be NULL. The events
-  /// ENTERED and LEFT report changes. A region must be the only observation of its world
+  /// Observes the avatars inside this region. NULL: no region. `avatars` must then be NULL. The
+  /// events ENTERED and LEFT report changes. A region must be the only observation of its world
   /// (NOT_ALLOWED).
   const stridewire_region* region;
 } stridewire_observation;
@@ -465,7 +466,7 @@ typedef enum stridewire_event_type {
   /// number of the others, which were executed.
   STRIDEWIRE_EVENT_REPLY = 6,
   /// Uses command, item_index, avatar, request_id, status, text. Reports an item that the server
-  /// refused, or the avatar id that it chose. Precedes the REPLY.
+  /// refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
   STRIDEWIRE_EVENT_ITEM = 7,
   /// Uses dropped_batches, dropped_events. This client reads too slowly.
   STRIDEWIRE_EVENT_LAGGING = 8,
@@ -562,9 +563,11 @@ typedef struct stridewire_event {
   uint64_t events_dropped_before;  ///< Events that the full queue dropped directly before this one.
   char text[STRIDEWIRE_MAX_TEXT_BYTES];
   double missed_m;  ///< Distance between the requested place and the nearest one in reach, metres.
-  /// Angle between the requested and the nearest direction or heading, the larger one.
+  /// Angle between the requested and the nearest direction, or between the headings, whichever is
+  /// larger.
   double missed_rad;
-  /// The nearest step or jump in reach, in the terms of stridewire_movement.
+  /// The members nearest_* describe the nearest step or jump in reach, like those of
+  /// stridewire_movement.
   double nearest_length_m;
   double nearest_side_m;
   double nearest_height_m;
@@ -689,8 +692,9 @@ stridewire_status stridewire_client_render_time(stridewire_client* client, doubl
 
 /// Origin of a sampled pose.
 typedef enum stridewire_pose_kind {
-  STRIDEWIRE_POSE_MISSING = 0,       ///< No pose is known for that time. Other fields are 0.
-  STRIDEWIRE_POSE_INTERPOLATED = 1,  ///< Interpolated between two received poses, or exactly one.
+  STRIDEWIRE_POSE_MISSING = 0,  ///< No pose is known for that time. Other fields are 0.
+  /// Interpolated between two received poses, or equal to a received pose.
+  STRIDEWIRE_POSE_INTERPOLATED = 1,
   /// The last received pose before that time. The next one has not arrived, or follows a
   /// discontinuity.
   STRIDEWIRE_POSE_HELD = 2,
@@ -714,8 +718,8 @@ typedef struct stridewire_pose {
   /// all others are relative to the parent joint. May be NULL if `joint_capacity` is 0.
   float* rotations_xyzw;
   size_t joint_capacity;  ///< Set by the caller: number of joints that `rotations_xyzw` can hold.
-  /// Number of the continuous motion to which the pose belongs, also if it is sampled. If it
-  /// differs from that of the pose that was displayed before, the avatar has teleported, or the
+  /// Number of the continuous motion to which the pose belongs. Sampled poses have it as well. If
+  /// it differs from that of the pose that was displayed before, the avatar has teleported, or the
   /// client has reconnected in between: the application must not blend the two poses.
   uint32_t segment;
 } stridewire_pose;
@@ -746,7 +750,8 @@ typedef struct stridewire_statistics {
   uint64_t bytes_sent;
   uint64_t batches_received;  ///< Number of pose batches and movement messages.
   uint64_t poses_received;
-  uint64_t poses_refused;  ///< Poses dropped for lack of memory, or not newer than the last.
+  /// Poses dropped because memory was exhausted or because they were not newer than the last one.
+  uint64_t poses_refused;
   /// Number of missing batches, estimated from gaps in the ticks of each shard.
   uint64_t batches_missing;
   uint64_t dropped_batches;  ///< Batches that the server reported as dropped.

@@ -72,7 +72,7 @@ export interface ErrorMap {
   readonly largest_m: number;
 }
 
-/** What avatars can do with a library. */
+/** Describes what avatars can do with a library. */
 export interface Summary {
   readonly summary: {
     /** One sentence per sort of movement. */

@@ -69,7 +69,7 @@ export class LibraryPage {
   private readonly legend = h('canvas',
     {class: 'legend', 'aria-hidden': 'true', width: 128, height: 1});
   private readonly legendText = h('span', {class: 'hint'});
-  /** What the library can do; folded so that it leaves room for the parameters. */
+  /** Describes what the library can do. It is folded, so that the parameters have more room. */
   private readonly summaryArea = h('details', {class: 'library-summary', id: 'summary'});
   private readonly message = h('div', {class: 'notice', role: 'alert'});
   private readonly scrub = h('input', {
