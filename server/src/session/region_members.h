@@ -90,7 +90,8 @@ class RegionMembers {
   // Rings from the inside out; the last one is unbounded.
   std::array<Ring, protocol::kMaxRateRings + 1> rings_;
   std::size_t ring_count_ = 0;
-  // Intervals by mode, including kMovement.
+  // [mode]: greatest common divisor of the intervals of the rings that use the mode, in ticks; 0 if
+  // none does. In addition to kSentModes, there is an entry for kMovement.
   std::array<std::uint16_t, kSentModes.size() + 1> intervals_{};
   std::map<int, ShardMembers> shards_;
   // Scratch memory, and the arrays to which the last Change refers.

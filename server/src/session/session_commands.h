@@ -100,7 +100,8 @@ class SessionCommands {
   template <typename Part>
   void SubmitParts(protocol::Seq seq, const std::shared_ptr<World>& world,
                    std::vector<Part>&& parts, Pending&& pending);
-  /// Distributes avatars to shards. `empty` is a part without avatars.
+  /// Executes a command that applies to a list of avatars: checks it, and sends each shard a copy
+  /// of `empty` to which the avatars of the shard have been added.
   template <typename Part>
   void SubmitAvatars(protocol::Seq seq, WorldId world, const std::vector<AvatarId>& avatars,
                      const Part& empty = {});
