@@ -17,8 +17,8 @@ namespace stridewire {
 /// A direction along one of the file's own axes.
 enum class BvhAxis : std::uint8_t { kPlusX, kMinusX, kPlusY, kMinusY, kPlusZ, kMinusZ };
 
-/// What determined the up axis of a capture. `kGuess`: the figure stands neither in the rest pose
-/// nor in the motion.
+/// Source of the up axis of a capture. `kGuess`: the figure stands neither in the rest pose nor in
+/// the motion.
 enum class UpSource : std::uint8_t { kOption, kRestPose, kMotion, kGuess };
 
 /// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y

@@ -13,7 +13,7 @@
 
 namespace stridewire {
 
-/// Which of the extracted examples LibraryBuilder keeps.
+/// Determines which of the extracted examples LibraryBuilder keeps.
 struct SelectionOptions {
   /// Upper bound on the error of a step that is left out: the mean distance between its joints and
   /// those of the step blended from the kept examples, at equal generic times. It also bounds how
@@ -78,7 +78,7 @@ struct LibraryBuilder {
   /// Averages examples whose parameters all lie within this distance of each other, in metres; a
   /// radian counts as 0.5 m. Uses complete linkage. 0: averages nothing.
   double cluster_diameter = 0.0;
-  /// Which examples (after averaging) to leave out; by default none.
+  /// Determines which examples are left out after averaging; by default none.
   SelectionOptions selection;
   /// Replaces the selected examples by a smooth function of their parameters that is robust against
   /// outliers. This keeps what the examples have in common and removes individual variation.

@@ -84,7 +84,7 @@ struct Synthesis {
   std::vector<MovementRecord> movements;
   std::vector<WalkRecord> walks;
   std::vector<SkippedRequest> skipped;
-  /// Why the feet are apart at the end of the choreography; empty if they are together.
+  /// Reason why the feet are apart at the end of the choreography; empty if they are together.
   std::string stop_reason;
 };
 

@@ -54,8 +54,8 @@ struct StepMeasures {
   double turn_rad = 0.0;
 };
 
-/// How a rejected step or jump would have missed its request. For steps with `exact_only` the
-/// values are exact, otherwise within a few centimetres.
+/// Describes by how much a rejected step or jump would have missed its request. For steps with
+/// `exact_only` the values are exact, otherwise within a few centimetres.
 struct FootprintError {
   /// Nearest footprint in reach. For a jump: point between the feet and heading after it.
   Footprint nearest;

@@ -80,13 +80,14 @@ struct WalkRequest {
 
 /// Determines when a request begins, and whether it replaces earlier requests.
 enum class Interrupt : std::uint8_t {
-  kNone,  ///< After all queued requests.
-  /// After the current movement. A current stand or walk ends. The queue is dropped.
+  kNone,  ///< The request begins after all queued requests.
+  /// The request begins after the current movement. A current stand or walk ends. The queue is
+  /// dropped.
   kAfterMovement,
-  /// At once if both feet stand, otherwise as soon as they have landed. The queue is dropped. If a
-  /// step or walk that moves the swinging foot is requested early enough in the swing
-  /// (AvatarSimulation::kLeastSwingLeft), the foot is redirected to the new footprint. For a stand
-  /// or jump, the step is shortened, if possible so that it brings the feet together.
+  /// The request begins at once if both feet stand, otherwise as soon as they have landed. The
+  /// queue is dropped. If a step or walk that moves the swinging foot is requested early enough in
+  /// the swing (AvatarSimulation::kLeastSwingLeft), the foot is redirected to the new footprint.
+  /// For a stand or jump, the step is shortened, if possible so that it brings the feet together.
   kNow,
 };
 

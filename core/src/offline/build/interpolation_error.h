@@ -15,7 +15,7 @@ struct InterpolationError {
   double corrected_mean_m = 0.0;
   /// Largest error after CorrectWeights, which corrects every movement when it starts.
   double corrected_max_m = 0.0;
-  /// Same, with at most three iterations of CorrectWeights.
+  /// Largest error after at most three iterations of CorrectWeights.
   double corrected_in_3_max_m = 0.0;
   double corrected_weight_sum_max = 0.0;  ///< Largest sum of |w| after correction.
   double weight_sum_max = 0.0;            ///< Largest sum of |w| without correction.

@@ -63,7 +63,8 @@ class PoseComparison {
                                                   std::span<const double> keytimes_s,
                                                   std::span<const int> cells);
 
-/// Same for a blend with `weights` [n]. It starts at the origin with heading 0.
+/// Returns the poses of a blend with `weights` [n] at the grid points. It starts at the origin with
+/// heading 0.
 [[nodiscard]] std::vector<Pose> PosesAtGridPoints(const MotionGroup& group,
                                                   const GridLayout& layout,
                                                   std::span<const double> weights);

@@ -132,7 +132,8 @@ bool SmoothJolts(const Skeleton& skeleton, const GridLayout& layout, GridExample
   const double spacing_s = duration_s / static_cast<double>(points - 1);
   const auto joints = static_cast<std::size_t>(skeleton.joint_count());
   const std::vector<bool> is_smoothed = SmoothedJoints(skeleton);
-  std::vector<JointTrack> worlds(joints, JointTrack(points));  // After smoothing, [joint][point].
+  // [joint][point]: world rotations after smoothing.
+  std::vector<JointTrack> worlds(joints, JointTrack(points));
   bool has_changed = false;
   for (std::size_t j = 0; j < joints; ++j) {
     JointTrack track(points);

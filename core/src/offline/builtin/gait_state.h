@@ -24,12 +24,12 @@ inline constexpr double kClipFps = 120.0;
 struct RollOff {
   double heel_rise_swing;  ///< Fraction of the swing of the other foot at which the heel rises.
   double strike;           ///< Pitch when the other foot lands.
-  double strike_rate;      ///< Per half of double support.
-  double state;            ///< In the middle of double support.
-  double state_rate;       ///< Per half of double support.
-  double toe_off_rate;     ///< Per half of double support.
+  double strike_rate;      ///< Change per half of double support, when the other foot lands.
+  double state;            ///< Pitch in the middle of double support.
+  double state_rate;       ///< Change per half of double support, in its middle.
+  double toe_off_rate;     ///< Change per half of double support, at toe-off.
   double toe_rock;         ///< Angle of the toes about their tip at toe-off.
-  double swing;            ///< In the middle of the swing.
+  double swing;            ///< Pitch in the middle of the swing.
 };
 
 /// The middle of double support in steady walking with the feet `length_m` apart. It determines

@@ -23,8 +23,9 @@ struct StepShape {
   /// Vector from the fixed to the moving foot at the start, in the heading frame of the start. Its
   /// z is at most 0.
   DVec3 start_m = DVec3(0.0);
-  DVec3 end_m = DVec3(0.0);  ///< Same at the end, in the heading frame of the end; z >= 0.
-  double turn_rad = 0.0;     ///< Change of heading; positive is left.
+  /// Vector from the fixed to the moving foot at the end, in the heading frame of the end; z >= 0.
+  DVec3 end_m = DVec3(0.0);
+  double turn_rad = 0.0;  ///< Change of heading; positive is left.
   StepStyle style = StepStyle::kStraight;
 };
 

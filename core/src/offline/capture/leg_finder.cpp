@@ -47,7 +47,7 @@ int Depth(const std::vector<Joint>& joints, int j) {
 
 // Two chains that start at children of the same joint.
 struct LimbPair {
-  std::vector<int> chains[2];  // From the first joint to the last one.
+  std::vector<int> chains[2];  // Joints of the two chains, from the first to the last.
   double length = 0.0;
   int depth = 0;
 };

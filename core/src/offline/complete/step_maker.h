@@ -25,7 +25,7 @@ struct Person {
 
 /// Feet at both ends of a step, as in the parameters of a general step.
 struct StepFeet {
-  DVec3 start_m = DVec3(0.0);  ///< From the fixed to the moving foot, in the heading frame.
+  DVec3 start_m = DVec3(0.0);  ///< Vector from the fixed to the moving foot, in the heading frame.
   DVec3 end_m = DVec3(0.0);
   double turn_rad = 0.0;  ///< Positive is left.
 };

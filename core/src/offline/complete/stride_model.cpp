@@ -28,7 +28,7 @@ constexpr double kRoughWindowS = 0.15;
 
 struct Stride {
   const RawExample* example = nullptr;
-  DVec3 start_m;  // From the fixed to the moving foot, in the heading frame.
+  DVec3 start_m;  // Vector from the fixed to the moving foot, in the heading frame.
   DVec3 end_m;
   [[nodiscard]] double length_m() const { return 0.5 * (end_m.z - start_m.z); }
 };

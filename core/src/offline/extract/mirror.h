@@ -10,7 +10,7 @@
 
 namespace stridewire {
 
-/// How a skeleton is mirrored at the plane x = 0.
+/// Describes how a skeleton is mirrored at the plane x = 0.
 struct SkeletonMirror {
   std::vector<int> partners;  ///< See FindMirrorJoints.
   /// [joint]: rotation from the joint's own frame to the mirror image of its partner's frame. If M

@@ -21,8 +21,9 @@ struct SegmentOptions {
   double feet_apart_max_s = 0.15;     ///< In a jump, both feet leave and land within this time.
   /// Steps that end less than this before the figure hangs on something are rejected.
   double reaching_s = 0.7;
-  double letting_go_s = 1.0;  ///< Same limit for steps that start after the figure has let go.
-  double still_m_s = 0.1;     ///< The figure stands still if its pelvis is slower than this.
+  /// Steps that start less than this after the figure has let go are rejected.
+  double letting_go_s = 1.0;
+  double still_m_s = 0.1;  ///< The figure stands still if its pelvis is slower than this.
 };
 
 /// A step, in frames of the tracks. It lasts from the centre of the double support before the swing

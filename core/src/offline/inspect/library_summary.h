@@ -34,8 +34,8 @@ struct Ability {
 
 /// Something that a library cannot do.
 struct MissingAbility {
-  std::string what;    ///< What is missing, for example "turns to the right".
-  std::string advice;  ///< Which recording or option adds it, as one sentence.
+  std::string what;    ///< Missing movements, for example "turns to the right".
+  std::string advice;  ///< Sentence that states which recording or option adds them.
 };
 
 /// Describes what avatars can do with a library.

@@ -22,7 +22,7 @@ struct Refusal {
   double missed_m = 0.0;  ///< Distance between the requested and the actual result.
   /// Angle between their directions or between their headings, whichever is larger.
   double missed_rad = 0.0;
-  /// One sentence without its subject, the movement: "did not arrive: ...".
+  /// A sentence whose subject, the movement, is left out: "did not arrive: ...".
   std::string reason;
 };
 

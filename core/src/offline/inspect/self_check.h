@@ -28,8 +28,8 @@ struct CheckResult {
   std::optional<double> measured;  ///< Empty if nothing could be measured.
   double bound = 0.0;              ///< The check fails if `measured` is larger.
   std::string unit;                ///< Unit of `measured` and `bound`: "m" or "degrees".
-  std::string text;                ///< What was measured or why it was not, as one sentence.
-  std::string advice;              ///< What to do about a failure; empty if the check did not fail.
+  std::string text;                ///< Sentence that states what was measured, or why nothing was.
+  std::string advice;              ///< Advice about the failure; empty if the check did not fail.
 };
 
 /// The results of all checks, always in the same order.

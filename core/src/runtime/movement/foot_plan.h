@@ -77,7 +77,7 @@ struct FootResidual {
 /// speed.
 struct RootApproach {
   DVec3 offset_m = DVec3(0.0);    ///< Displacement of the root by the rotations of the legs.
-  DVec3 offset_m_s = DVec3(0.0);  ///< Its velocity at the start of the movement.
+  DVec3 offset_m_s = DVec3(0.0);  ///< Velocity of this displacement at the start of the movement.
   double over_s = 0.0;            ///< If less than Movement::ease_out_s, nothing is added.
 };
 

@@ -45,9 +45,10 @@ struct FootPlanJob {
   const MotionLibrary& library;
   const FootLocks& locks;  ///< Positions of the feet at the start.
   BlendSource source;
-  FootPlanScratch& scratch;  ///< Its cache may only contain rows of this movement.
-  PoseSpan pose;             ///< Scratch with one rotation per joint.
-  Movement& movement;        ///< Its weights and heading must be set.
+  /// Scratch memory, whose cache may only contain rows of this movement.
+  FootPlanScratch& scratch;
+  PoseSpan pose;       ///< Scratch with one rotation per joint.
+  Movement& movement;  ///< Movement to plan. Its weights and heading must be set.
 };
 
 /// Plans the feet of a movement. Sets its base position, so that the foot that stays (for a jump:

@@ -56,7 +56,7 @@ void PlanRootApproach(const FootPlanJob& job) {
   const double ease_out_s = movement.ease_out_s;
   FootSampler sampler(job.scratch, job.pose);
   const double step_s = std::min(kBlendStepS, 0.5 * ease_out_s);
-  // With the difference pose, then without it.
+  // Samples the movement with the difference pose, and then without it.
   sampler.Sample(movement, std::array{start_s, start_s + step_s, start_s, start_s + step_s}, 2);
   const auto above_feet = [&](std::size_t i) {
     DVec3 root = sampler.Root(i);

@@ -37,7 +37,7 @@ Quartic LevellingQuartic(const std::array<double, kStanceSamples.size()>& above_
   std::array<double, kLevelSamples.size()> values;
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = Levelling(above_m[kLevelSamples[i]]);
   Quartic level = QuarticThrough(values);
-  // What is added is a sum of the Legendre polynomials on [0, 1].
+  // The heights to add are a sum of the Legendre polynomials on [0, 1].
   using Values = std::array<double, 5>;
   Values added{};
   const auto basis = [](double u) -> Values {

@@ -18,7 +18,7 @@ namespace {
 // A foot within this distance and angle of its footprint at the goal has arrived.
 constexpr double kArrivedM = 0.002;
 constexpr double kArrivedRad = 0.004;
-// The same tolerances without planting, when feet land wherever the blend puts them.
+// The same tolerances without planting. Feet then land wherever the blend puts them.
 constexpr double kRoughlyArrivedM = 0.15;
 constexpr double kRoughlyArrivedRad = 0.25;
 
@@ -29,7 +29,7 @@ constexpr double kMaxErrorM = 0.16;
 constexpr double kErrorWeight = 0.35;
 // Largest difference in height, for libraries that have climbing steps.
 constexpr double kMaxErrorHeightM = 0.08;
-// The same for the heading of the body after the step, which planting cannot change.
+// Largest error of the heading of the body after the step, which planting cannot change.
 constexpr double kMaxErrorRad = 0.015;
 constexpr double kMaxLooseErrorRad = 0.5;
 // Steps of walks may turn this much more or less than the library's own steps. With
@@ -64,9 +64,9 @@ constexpr double kEdgeStepM = 0.02;
 constexpr double kMaxHurdleM = 0.25;
 constexpr double kHurdleRadiusM = 0.06;
 
-// To compare steps, efforts and costs are added, in metres (WalkSteering::EffortM).
-// Share of the effort after the first step, beside that after both steps. Otherwise, the walk could
-// put off its progress for ever.
+// To compare steps, efforts and costs are added, in metres (WalkSteering::EffortM). Weight of the
+// effort that remains after the first step. It is added to the effort that remains after both
+// steps. Without it, the walk could postpone its progress for ever.
 constexpr double kFirstWeight = 0.2;
 // Cost of a metre that the body moves, so that the walk turns in place rather than in a wide curve.
 constexpr double kPathWeight = 0.15;
@@ -87,7 +87,7 @@ constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
 // length, if that leads onto ground that is at least kLeastClimbM higher or lower than the standing
 // foot. People do not skip treads of stairs either.
 constexpr double kEasyClimbM = 0.18;
-// The same on slopes, where the normal of the ground has at most this y.
+// Replaces kEasyClimbM on slopes, where the y of the ground's normal is at most kSlopeNormalY.
 constexpr double kEasySlopeClimbM = 0.15;
 constexpr float kSlopeNormalY = 0.985f;
 constexpr double kLeastClimbM = 0.05;

@@ -116,7 +116,8 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
   }
 }
 
-// The same operations as kernels::ComputeGridSamples. For a single time they are faster in scalars.
+// Executes the operations of kernels::ComputeGridSamples for a single time, for which scalars are
+// faster.
 PoseSample SampleAt(const MotionGroup& group, const Movement& movement, double time_s) {
   const CellWeights cell =
       CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);

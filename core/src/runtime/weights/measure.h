@@ -17,7 +17,7 @@ namespace stridewire {
                                               const Movement& movement, GridCache& cache,
                                               PoseSpan pose);
 
-/// The same for a group that is not part of a library yet.
+/// Measures a movement of a group that is not part of a library yet.
 [[nodiscard]] ParameterValues MeasureMovement(const Skeleton& skeleton, const GridLayout& layout,
                                               const MotionGroup& group, const Movement& movement,
                                               GridCache& cache, PoseSpan pose);
