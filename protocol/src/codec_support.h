@@ -21,8 +21,8 @@ using flatbuffers::Offset;
 
 #include "codec.h"
 
-/// What the generated code (codec.cpp) uses: conversions of the types of core and GLM, and lists.
-/// The schema's attributes name the cases; protocol/generator/README.md explains them.
+/// Functions that the generated code (codec.cpp) calls: they convert types of core and GLM, and
+/// lists. The schema's attributes name the cases; protocol/generator/README.md explains them.
 namespace stridewire::protocol {
 
 // ---- vectors and quaternions

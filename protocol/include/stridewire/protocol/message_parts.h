@@ -102,10 +102,10 @@ struct RequestItem {
 /// The step or jump in reach that is nearest to a rejected one. The foot of a step, or the middle
 /// between the feet of a jump, would land at Event::position_m.
 struct NearestMovement {
-  double length_m = 0.0;     ///< As in StepMovement or JumpMovement.
-  double side_m = 0.0;       ///< As in StepMovement; 0 for jumps.
-  double height_m = 0.0;     ///< As in StepMovement or JumpMovement.
-  double turn_rad = 0.0;     ///< As in StepMovement or JumpMovement.
+  double length_m = 0.0;     ///< Same meaning as in StepMovement or JumpMovement.
+  double side_m = 0.0;       ///< Same meaning as in StepMovement; 0 for jumps.
+  double height_m = 0.0;     ///< Same meaning as in StepMovement or JumpMovement.
+  double turn_rad = 0.0;     ///< Same meaning as in StepMovement or JumpMovement.
   double heading_rad = 0.0;  ///< Heading of the foot, or of the avatar after a jump.
   bool operator==(const NearestMovement&) const = default;
 };

@@ -23,7 +23,8 @@ enum class PoseMode : std::uint8_t {
   kCompactRoot = 5,     ///< Compact poses of PoseDetail::kRoot.
 };
 
-/// Which joints a compact pose contains. Omitted joints are decoded to their reference rotations.
+/// Selects the joints that a compact pose contains. Omitted joints are decoded to their reference
+/// rotations.
 enum class PoseDetail : std::uint8_t {
   kAll = 0,
   kReduced = 1,  ///< The joints that WorldInfo::reduced_joints lists.
