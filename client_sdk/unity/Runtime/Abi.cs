@@ -79,7 +79,7 @@ namespace Stridewire
         Jump = 1,
         /// <summary>Stand for a given time.</summary>
         Stand = 2,
-        /// <summary>As many steps as needed to reach a position and heading.</summary>
+        /// <summary>Walk with as many steps as needed to a position and heading.</summary>
         Walk = 3,
     }
 

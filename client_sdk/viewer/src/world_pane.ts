@@ -13,7 +13,7 @@ export interface WorldPane {
   randomWalkers: RandomWalkers | null;
   /** Ids of the avatars that this page has spawned. */
   readonly ownAvatars: Set<number>;
-  /** Why the server refused to let this page join the world; empty if it did not. */
+  /** Reason why the server refused to let this page join the world; empty if it did not. */
   refusal: string;
 }
 

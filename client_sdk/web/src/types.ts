@@ -21,7 +21,7 @@ export type Role = 'controller' | 'observer';
  */
 export type PoseMode = 'full' | 'quantised' | 'movement';
 /**
- * Which joints a quantised pose contains.
+ * Selects the joints that a quantised pose contains.
  * - `all`: all joints.
  * - `reduced`: without joints that move no point of the figure by more than 0.12 m, for example
  *   hands, toes and head.
@@ -35,7 +35,7 @@ export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
 /** Kind of a movement that an avatar carries out. */
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
 /**
- * When a requested movement starts.
+ * Determines when a requested movement starts.
  * - `none`: after all queued movements.
  * - `afterMovement`: after the current movement. Clears the queue and ends a stand or walk.
  * - `now`: as soon as the feet allow it. Clears the queue and ends a stand or walk.
@@ -495,7 +495,7 @@ export interface Skeleton {
 }
 
 /**
- * Where a sampled pose comes from.
+ * Origin of a sampled pose.
  * - `interpolated`: from the received poses around the sampled time, or exactly a received one.
  * - `held`: the last pose before the sampled time, because no continuous pose follows.
  * - `missing`: no pose is known for that time, and the output is not valid.

@@ -218,7 +218,7 @@ typedef enum stridewire_movement_type {
   STRIDEWIRE_STEP = 0,   ///< Step with given parameters or to a given footprint.
   STRIDEWIRE_JUMP = 1,   ///< Jump with both feet.
   STRIDEWIRE_STAND = 2,  ///< Stand for a given time.
-  STRIDEWIRE_WALK = 3,   ///< As many steps as needed to reach a position and heading.
+  STRIDEWIRE_WALK = 3,   ///< Walk with as many steps as needed to a position and heading.
   STRIDEWIRE_MOVEMENT_TYPE_MAX = 0x7fffffff
 } stridewire_movement_type;
 
@@ -381,8 +381,8 @@ typedef enum stridewire_pose_mode {
   STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff
 } stridewire_pose_mode;
 
-/// Which joints STRIDEWIRE_QUANTISED poses contain. Omitted joints have their reference rotations,
-/// which are typical rotations in the library.
+/// Selects the joints that STRIDEWIRE_QUANTISED poses contain. Omitted joints have their reference
+/// rotations, which are typical rotations in the library.
 typedef enum stridewire_pose_detail {
   STRIDEWIRE_DETAIL_ALL = 0,
   /// Omits hands, toes, head and other joints whose omission moves no point by more than 0.12 m.
