@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <cstring>
 #include <random>
@@ -63,7 +64,7 @@ stridewire_status stridewire_client_create(const stridewire_client_options* opti
   if (!InRange<std::uint32_t>(o.max_events, 16, 1u << 24) ||
       !InRange<std::uint32_t>(o.max_commands, 1, 1u << 20) ||
       !InRange<std::uint32_t>(o.pose_history, 2, 4096) || o.max_command_bytes < kLeastBytes ||
-      o.max_pose_bytes < kLeastBytes || !InRange(o.render_delay_s, 0.0, 10.0) ||
+      o.max_pose_bytes < kLeastBytes || std::isnan(o.render_delay_s) || o.render_delay_s > 10.0 ||
       !InRange(o.connect_timeout_s, 0.01, 600.0) || !InRange(o.ping_interval_s, 0.01, 600.0)) {
     return STRIDEWIRE_OUT_OF_RANGE;
   }

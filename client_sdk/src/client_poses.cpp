@@ -55,7 +55,8 @@ void WriteRotations(std::span<const Quat> rotations, float* out) {
   }
 }
 
-/// Resets `pose` to MISSING and, if the avatar has a history, calls `write(view, history)`.
+/// Resets `pose` to MISSING and, if the avatar has a history, calls
+/// `write(session, is_gone, history)`.
 template <typename Write>
 stridewire_status ReadPose(stridewire_client* client, stridewire_world world, std::uint32_t avatar,
                            stridewire_pose* pose, const Write& write) {
@@ -68,15 +69,15 @@ stridewire_status ReadPose(stridewire_client* client, stridewire_world world, st
   pose->rotations_xyzw = rotations_xyzw;
   pose->joint_capacity = joint_capacity;
   return Query(client, [&](Session& session) {
-    const WorldView* view = session.FindWorld(world);
+    WorldView* view = session.FindWorld(world);
     if (view == nullptr) return STRIDEWIRE_NO_SUCH_WORLD;
-    const PoseHistory* history = view->Find(avatar);
+    PoseHistory* history = view->Find(avatar);
     if (history == nullptr || history->size() == 0) return STRIDEWIRE_OK;
     if (joint_capacity < history->joint_count()) {
       pose->joint_count = static_cast<std::uint32_t>(history->joint_count());
       return STRIDEWIRE_BUFFER_TOO_SMALL;
     }
-    write(*view, *history);
+    write(session, view->IsGone(avatar), *history);
     if (pose->kind != STRIDEWIRE_POSE_MISSING) {
       pose->joint_count = static_cast<std::uint32_t>(history->joint_count());
     }
@@ -220,7 +221,16 @@ stridewire_status stridewire_client_render_time(stridewire_client* client, doubl
   if (time_s == nullptr) return STRIDEWIRE_INVALID_ARGUMENT;
   return Query(client, [&](Session& session) {
     if (!session.clock().ready()) return STRIDEWIRE_NOT_READY;
-    *time_s = session.clock().ServerTime(client->network.Now()) - session.render_delay_s();
+    *time_s = session.RenderTime(client->network.Now());
+    return STRIDEWIRE_OK;
+  });
+}
+
+stridewire_status stridewire_client_get_playout(stridewire_client* client,
+                                                stridewire_playout* playout) {
+  if (playout == nullptr) return STRIDEWIRE_INVALID_ARGUMENT;
+  return Query(client, [&](Session& session) {
+    *playout = session.Playout(client->network.Now());
     return STRIDEWIRE_OK;
   });
 }
@@ -229,31 +239,34 @@ stridewire_status stridewire_client_sample_pose(stridewire_client* client, strid
                                                 uint32_t avatar, double time_s,
                                                 stridewire_pose* pose) {
   if (!std::isfinite(time_s)) return STRIDEWIRE_OUT_OF_RANGE;
-  return ReadPose(
-      client, world, avatar, pose, [&](const WorldView& view, const PoseHistory& history) {
-        Vec3 root_position_m;
-        std::array<Quat, STRIDEWIRE_MAX_JOINTS> rotations;
-        const auto joints = std::span(rotations).first(history.joint_count());
-        const double newest_s = history.stamp(history.size() - 1).time_s;
-        if (time_s > newest_s && view.IsGone(avatar)) return;
-        const auto sampled = history.Sample(time_s, root_position_m, joints);
-        if (!sampled) return;
-        const PoseStamp& stamp = history.stamp(sampled->index);
-        pose->kind = sampled->interpolated ? STRIDEWIRE_POSE_INTERPOLATED : STRIDEWIRE_POSE_HELD;
-        pose->tick = stamp.tick;
-        pose->time_s = time_s;
-        pose->held_s = sampled->interpolated ? 0.0 : time_s - stamp.time_s;
-        pose->standing = stamp.standing ? 1 : 0;
-        pose->detail = static_cast<std::uint8_t>(stamp.detail);
-        pose->segment = stamp.segment;
-        CopyVector(root_position_m, pose->root_position_m);
-        WriteRotations(joints, pose->rotations_xyzw);
-      });
+  return ReadPose(client, world, avatar, pose,
+                  [&](Session& session, bool is_gone, PoseHistory& history) {
+                    Vec3 root_position_m;
+                    std::array<Quat, STRIDEWIRE_MAX_JOINTS> rotations;
+                    const auto joints = std::span(rotations).first(history.joint_count());
+                    const bool is_after_newest = time_s > history.stamp(history.size() - 1).time_s;
+                    if (is_after_newest && is_gone) return;
+                    const auto sampled = history.Display(time_s, root_position_m, joints);
+                    if (!sampled) return;
+                    session.displayed().Add(*sampled, is_after_newest);
+                    const PoseStamp& stamp = history.stamp(sampled->index);
+                    pose->kind = sampled->interpolated   ? STRIDEWIRE_POSE_INTERPOLATED
+                                 : sampled->extrapolated ? STRIDEWIRE_POSE_EXTRAPOLATED
+                                                         : STRIDEWIRE_POSE_HELD;
+                    pose->tick = stamp.tick;
+                    pose->time_s = time_s;
+                    pose->held_s = sampled->interpolated ? 0.0 : time_s - stamp.time_s;
+                    pose->standing = stamp.standing ? 1 : 0;
+                    pose->detail = static_cast<std::uint8_t>(stamp.detail);
+                    pose->segment = stamp.segment;
+                    CopyVector(root_position_m, pose->root_position_m);
+                    WriteRotations(joints, pose->rotations_xyzw);
+                  });
 }
 
 stridewire_status stridewire_client_latest_pose(stridewire_client* client, stridewire_world world,
                                                 uint32_t avatar, stridewire_pose* pose) {
-  return ReadPose(client, world, avatar, pose, [&](const WorldView&, const PoseHistory& history) {
+  return ReadPose(client, world, avatar, pose, [&](Session&, bool, const PoseHistory& history) {
     WriteRaw(history, history.size() - 1, pose);
   });
 }
@@ -261,7 +274,7 @@ stridewire_status stridewire_client_latest_pose(stridewire_client* client, strid
 stridewire_status stridewire_client_next_pose(stridewire_client* client, stridewire_world world,
                                               uint32_t avatar, uint64_t after_tick,
                                               stridewire_pose* pose) {
-  return ReadPose(client, world, avatar, pose, [&](const WorldView&, const PoseHistory& history) {
+  return ReadPose(client, world, avatar, pose, [&](Session&, bool, const PoseHistory& history) {
     const auto index = after_tick == std::numeric_limits<std::uint64_t>::max()
                            ? std::optional<std::size_t>(0)
                            : history.FirstAfterTick(after_tick);

@@ -13,10 +13,11 @@ namespace stridewire::client {
 enum CrowdFlags : std::uint8_t {
   /// The last received pose at or before the sampled time does not continue the previous one.
   kCrowdDiscontinuity = 1,
-  kCrowdStanding = 2,  ///< The avatar stands and its queue is empty.
-  kCrowdHeld = 4,      ///< The pose is not interpolated, because no continuous pose follows.
-  kCrowdReduced = 8,   ///< The server sent the pose with PoseDetail::kReduced.
-  kCrowdRoot = 16,     ///< The server sent the pose with PoseDetail::kRoot.
+  kCrowdStanding = 2,       ///< The avatar stands and its queue is empty.
+  kCrowdHeld = 4,           ///< The pose does not move, because no continuous pose follows.
+  kCrowdReduced = 8,        ///< The server sent the pose with PoseDetail::kReduced.
+  kCrowdRoot = 16,          ///< The server sent the pose with PoseDetail::kRoot.
+  kCrowdExtrapolated = 32,  ///< The pose continues the motion after the newest pose.
 };
 
 /// Returns the flags of a received pose.

@@ -9,14 +9,17 @@ namespace stridewire::client {
 PoseHistory::PoseHistory(std::size_t capacity, std::size_t joint_count)
     : joint_count_(joint_count),
       stamps_(capacity),
+      slope_is_before_(capacity),
       roots_m_(capacity),
       rotations_(capacity * joint_count, kIdentityQuat) {
+  correction_.rotations.resize(joint_count, kIdentityQuat);
+  displayed_.resize(joint_count, kIdentityQuat);
   STRIDEWIRE_CHECK(capacity > 0 && joint_count > 0);
 }
 
 std::size_t PoseHistory::Bytes(std::size_t capacity, std::size_t joint_count) {
-  return sizeof(PoseHistory) +
-         capacity * (sizeof(PoseStamp) + sizeof(Vec3) + joint_count * sizeof(Quat));
+  return sizeof(PoseHistory) + 2 * joint_count * sizeof(Quat) +
+         capacity * (sizeof(PoseStamp) + 1 + sizeof(Vec3) + joint_count * sizeof(Quat));
 }
 
 bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
@@ -24,6 +27,21 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
   if (size_ > 0) {
     const PoseStamp& newest = this->stamp(size_ - 1);
     if (stamp.tick <= newest.tick || stamp.time_s <= newest.time_s) return false;
+    if (stamp.discontinuity || IsInterrupted()) {
+      correction_.state = Correction::State::kNone;
+      if (displayed_s_ < this->stamp(0).time_s) displayed_s_ = kNever;
+    } else if (displayed_s_ > newest.time_s && correction_.state != Correction::State::kPending) {
+      // The curve after the newest pose changes, although it was displayed.
+      Vec3 root_m;
+      if (Sample(displayed_s_, root_m, displayed_)) {
+        correction_.state = Correction::State::kPending;
+        correction_.start_s = displayed_s_;
+        correction_.root_m = root_m;
+        correction_.rotations.swap(displayed_);
+      }
+    }
+    const bool has_begun = size_ > 1 && displayed_s_ > this->stamp(size_ - 2).time_s;
+    slope_is_before_[Slot(size_ - 1)] = has_begun ? 1 : 0;
   }
   if (size_ == stamps_.size()) {
     first_ = (first_ + 1) % stamps_.size();
@@ -32,6 +50,7 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
   STRIDEWIRE_CHECK(size_ < stamps_.size() && rotations.size() == joint_count_);
   const std::size_t slot = Slot(size_++);
   stamps_[slot] = stamp;
+  slope_is_before_[slot] = 0;
   roots_m_[slot] = root_position_m;
   std::ranges::copy(rotations,
                     rotations_.begin() + static_cast<std::ptrdiff_t>(slot * joint_count_));
@@ -76,14 +95,17 @@ void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
   const double length_s = end_s - start_s;
   // The slopes at start and end are those of the secants through their neighbours, scaled to the
   // interval.
-  const auto scale_start = static_cast<float>(length_s / (end_s - before_s));
+  const bool is_before = keys.start_slope_is_before && before_s < start_s;
+  const Vec3& slope_end_m = is_before ? keys.start.root_position_m : keys.end.root_position_m;
+  const auto scale_start =
+      static_cast<float>(length_s / ((is_before ? start_s : end_s) - before_s));
   const auto scale_end = static_cast<float>(length_s / (beyond_s - start_s));
   const Hermite h(static_cast<float>((time_s - start_s) / length_s));
 
   const Vec3& start_m = keys.start.root_position_m;
   const Vec3& end_m = keys.end.root_position_m;
   root_position_m = start_m + h.value_1 * (end_m - start_m) +
-                    h.slope_0 * scale_start * (end_m - keys.before.root_position_m) +
+                    h.slope_0 * scale_start * (slope_end_m - keys.before.root_position_m) +
                     h.slope_1 * scale_end * (keys.beyond.root_position_m - start_m);
 
   for (std::size_t joint = 0; joint < rotations.size(); ++joint) {
@@ -91,14 +113,82 @@ void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
     const Quat at_before = Near(keys.before.rotations[joint], at_start);
     const Quat at_end = Near(keys.end.rotations[joint], at_start);
     const Quat at_beyond = Near(keys.beyond.rotations[joint], at_end);
+    const Quat slope_end = is_before ? at_start : at_end;
     rotations[joint] = Normalise(at_start + (at_end - at_start) * h.value_1 +
-                                 (at_end - at_before) * (h.slope_0 * scale_start) +
+                                 (slope_end - at_before) * (h.slope_0 * scale_start) +
                                  (at_beyond - at_start) * (h.slope_1 * scale_end));
   }
 }
 
+bool PoseHistory::IsInterrupted() const {
+  if (size_ == 0 || displayed_s_ == kNever) return false;
+  const double newest_s = stamp(size_ - 1).time_s;
+  // Poses of distant avatars may be further apart than the longest extrapolation.
+  const double interval_s = size_ > 1 ? newest_s - stamp(size_ - 2).time_s : 0.0;
+  return displayed_s_ < stamp(0).time_s ||
+         displayed_s_ - newest_s > std::max(kMaxExtrapolationS, 2.0 * interval_s);
+}
+
+void PoseHistory::Extrapolate(std::size_t j, double time_s, Vec3& root_position_m,
+                              std::span<Quat> rotations) const {
+  root_position_m = this->root_position_m(j);
+  std::ranges::copy(this->rotations(j), rotations.begin());
+  if (j == 0 || stamp(j).discontinuity) return;
+  // The speed decreases as (1 - s)^2.
+  const double s = std::min(1.0, (time_s - stamp(j).time_s) / kMaxExtrapolationS);
+  const double passed_s = kMaxExtrapolationS * s * (1.0 - s + s * s / 3.0);
+  const auto scale = static_cast<float>(passed_s / (stamp(j).time_s - stamp(j - 1).time_s));
+  root_position_m += scale * (root_position_m - this->root_position_m(j - 1));
+  for (std::size_t joint = 0; joint < rotations.size(); ++joint) {
+    const Quat newest = rotations[joint];
+    rotations[joint] =
+        Normalise(newest + (newest - Near(this->rotations(j - 1)[joint], newest)) * scale);
+  }
+}
+
+void PoseHistory::ResolveCorrection() {
+  if (correction_.state != Correction::State::kPending) return;
+  Vec3 root_m;
+  correction_.state = Correction::State::kNone;
+  const auto sampled = SampleCurve(correction_.start_s, root_m, displayed_);
+  if (!sampled) return;
+  correction_.state = Correction::State::kActive;
+  correction_.root_m -= root_m;
+  for (std::size_t joint = 0; joint < joint_count_; ++joint) {
+    correction_.rotations[joint] =
+        Normalise(correction_.rotations[joint] * glm::conjugate(displayed_[joint]));
+  }
+}
+
+std::optional<PoseHistory::Sampled> PoseHistory::Display(double time_s, Vec3& root_position_m,
+                                                         std::span<Quat> rotations) {
+  ResolveCorrection();
+  const auto sampled = Sample(time_s, root_position_m, rotations);
+  if (sampled) displayed_s_ = time_s;
+  return sampled;
+}
+
 std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& root_position_m,
                                                         std::span<Quat> rotations) const {
+  const auto sampled = SampleCurve(time_s, root_position_m, rotations);
+  const double passed_s = time_s - correction_.start_s;
+  if (!sampled || correction_.state != Correction::State::kActive || passed_s < 0.0 ||
+      passed_s >= kCorrectionS) {
+    return sampled;
+  }
+  const auto s = static_cast<float>(1.0 - passed_s / kCorrectionS);
+  const float rest = s * s * (3.0f - 2.0f * s);
+  root_position_m += rest * correction_.root_m;
+  for (std::size_t joint = 0; joint < joint_count_; ++joint) {
+    const Quat difference = Near(correction_.rotations[joint], kIdentityQuat);
+    rotations[joint] =
+        Normalise((kIdentityQuat + (difference - kIdentityQuat) * rest) * rotations[joint]);
+  }
+  return sampled;
+}
+
+std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3& root_position_m,
+                                                             std::span<Quat> rotations) const {
   std::size_t after = 0;
   std::size_t high = size_;
   while (after < high) {
@@ -114,7 +204,16 @@ std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& roo
   const std::size_t j = after;
 
   const bool exact = stamp(i).time_s == time_s;
-  if (exact || j == size_ || stamp(j).discontinuity) {
+  // After a break of the connection, what was displayed before the next pose arrived continues.
+  const double before_s = i > 0 ? stamp(i).time_s - stamp(i - 1).time_s : 0.0;
+  const bool is_last =
+      j == size_ || (stamp(j).discontinuity && stamp(j).time_s - stamp(i).time_s > 1.5 * before_s);
+  if (is_last && !exact) {
+    Extrapolate(i, time_s, root_position_m, rotations);
+    const bool moves = i > 0 && !stamp(i).discontinuity;
+    return Sampled{i, false, moves && time_s - stamp(i).time_s < kMaxExtrapolationS};
+  }
+  if (exact || stamp(j).discontinuity) {
     root_position_m = this->root_position_m(i);
     std::ranges::copy(this->rotations(i), rotations.begin());
     return Sampled{i, exact};
@@ -122,7 +221,9 @@ std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& roo
 
   // If a neighbour is missing, i or j takes its place, which results in the secant of the interval.
   const std::size_t before = i > 0 && !stamp(i).discontinuity ? i - 1 : i;
-  const std::size_t beyond = j + 1 < size_ && !stamp(j + 1).discontinuity ? j + 1 : j;
+  const bool has_beyond =
+      j + 1 < size_ && !stamp(j + 1).discontinuity && slope_is_before_[Slot(j)] == 0;
+  const std::size_t beyond = has_beyond ? j + 1 : j;
   const auto pose = [this](std::size_t k) {
     return ConstPoseSpan{this->root_position_m(k), this->rotations(k)};
   };
@@ -131,7 +232,8 @@ std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& roo
        .before = pose(before),
        .start = pose(i),
        .end = pose(j),
-       .beyond = pose(beyond)},
+       .beyond = pose(beyond),
+       .start_slope_is_before = slope_is_before_[Slot(i)] != 0},
       time_s, root_position_m, rotations);
   return Sampled{i, true};
 }

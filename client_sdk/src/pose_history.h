@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -21,6 +22,9 @@ struct PoseKeys {
   ConstPoseSpan start;
   ConstPoseSpan end;
   ConstPoseSpan beyond;
+  /// True: the slope at the start is that of the interval before it, instead of the secant from
+  /// `before` to `end`.
+  bool start_slope_is_before = false;
 };
 
 /// Computes the pose at `time_s` inside the interval by cubic Hermite interpolation, which is
@@ -31,8 +35,20 @@ void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
 
 /// Jitter buffer: the last poses of one avatar, the oldest first. It allocates in its constructor
 /// only. A full buffer drops its oldest pose.
+///
+/// What is displayed is continuous, whenever poses arrive:
+///   - A curve through the poses is not changed after its display has begun. The slope at a pose
+///     is the secant through both neighbours. If an interval is displayed before the pose after it
+///     has arrived, the slope at its end is and remains that of the interval itself.
+///   - After the newest pose, and after the last pose before a gap, the motion continues and slows
+///     down until it stops, within kMaxExtrapolationS.
+///   - If a pose arrives after its time was displayed, the difference to the displayed pose fades
+///     within kCorrectionS.
 class PoseHistory {
  public:
+  static constexpr double kMaxExtrapolationS = 0.25;
+  static constexpr double kCorrectionS = 0.3;
+
   /// `capacity` (in poses) and `joint_count` must be above 0.
   PoseHistory(std::size_t capacity, std::size_t joint_count);
 
@@ -54,29 +70,70 @@ class PoseHistory {
   /// Returns the index of the oldest pose with a tick above `tick`, if any.
   [[nodiscard]] std::optional<std::size_t> FirstAfterTick(std::uint64_t tick) const;
 
+  /// Returns true if the next pose cannot continue what is displayed: if the display has stopped
+  /// after the newest pose, or if the displayed poses are no longer stored.
+  [[nodiscard]] bool IsInterrupted() const;
+
+  /// Changes the segment of a stored pose.
+  void SetSegment(std::size_t i, std::uint32_t segment) { stamps_[Slot(i)].segment = segment; }
+
   /// Describes how Sample computed a pose.
   struct Sampled {
     std::size_t index = 0;  ///< Index of the newest pose at or before the sampled time.
-    /// True if the pose was interpolated, false if pose `index` is returned unchanged.
+    /// True if the pose was interpolated, or is exactly the received pose `index`.
     bool interpolated = false;
+    /// True if the pose continues the motion after the newest pose. If both are false, the pose is
+    /// held: it is pose `index`, or the end of the extrapolation.
+    bool extrapolated = false;
   };
 
   /// Computes the pose at `time_s` by cubic Hermite interpolation, which is continuous in its first
   /// derivative and exact at received poses. Rotations are interpolated in one hemisphere and
-  /// normalized. After the newest pose, or before a discontinuity, the last pose is returned
-  /// unchanged. Returns an empty optional before the oldest pose.
+  /// normalized. Before a discontinuity, the last pose is returned unchanged. Returns an empty
+  /// optional before the oldest pose.
   [[nodiscard]] std::optional<Sampled> Sample(double time_s, Vec3& root_position_m,
                                               std::span<Quat> rotations) const;
 
+  /// Same as Sample, for a pose that is displayed: poses that arrive later continue it.
+  std::optional<Sampled> Display(double time_s, Vec3& root_position_m, std::span<Quat> rotations);
+
  private:
   [[nodiscard]] std::size_t Slot(std::size_t i) const { return (first_ + i) % stamps_.size(); }
+
+  /// Sample without the correction.
+  [[nodiscard]] std::optional<Sampled> SampleCurve(double time_s, Vec3& root_position_m,
+                                                   std::span<Quat> rotations) const;
+  /// Continues the motion after pose `j`.
+  void Extrapolate(std::size_t j, double time_s, Vec3& root_position_m,
+                   std::span<Quat> rotations) const;
+  void ResolveCorrection();
+
+  static constexpr double kNever = -std::numeric_limits<double>::infinity();
+
+  /// A displayed pose that the curve does not contain.
+  struct Correction {
+    enum class State : std::uint8_t {
+      kNone,
+      kPending,  ///< The pose is the one that was displayed at `start_s`.
+      kActive,   ///< The pose is the difference to the curve at `start_s`.
+    };
+    State state = State::kNone;
+    double start_s = 0.0;
+    Vec3 root_m = Vec3(0.0f);
+    std::vector<Quat> rotations;
+  };
 
   std::size_t joint_count_;
   std::size_t first_ = 0;
   std::size_t size_ = 0;
   std::vector<PoseStamp> stamps_;
+  /// 1: the slope at the pose is that of the interval before it.
+  std::vector<std::uint8_t> slope_is_before_;
   std::vector<Vec3> roots_m_;
   std::vector<Quat> rotations_;
+  double displayed_s_ = kNever;  ///< Time of the last Display.
+  Correction correction_;
+  std::vector<Quat> displayed_;  ///< Scratch memory.
 };
 
 }  // namespace stridewire::client

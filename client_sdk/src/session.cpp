@@ -183,6 +183,7 @@ void Session::LoseConnection(stridewire_status status, std::string_view text, do
   last_text_ = text.empty() ? stridewire_status_text(status) : text;
   STRIDEWIRE_CHECK(NeedsSocket() && state_ != State::kClosing);
   const bool was_ready = state_ == State::kReady;
+  if (playout_.ready()) playout_.OnStall(now_s);
   if (was_ready && now_s - ready_s_ >= kStableS) backoff_.Reset();
   if (!was_ready) ++connect_failures_;
   state_ = State::kWaiting;
@@ -240,6 +241,7 @@ void Session::Reset() {
   resend_from_ = 0;
   last_events_number_ = 0;
   clock_.Reset();
+  playout_.Reset();
   rtts_s_.clear();
   pending_pings_.clear();
   inspections_.clear();

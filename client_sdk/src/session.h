@@ -102,8 +102,8 @@ class Session : public SessionCommands {
   void CloseWithError(stridewire_status status, std::string_view text);
   void SendPing(double now_s);
   void SchedulePing(double now_s);
-  /// Updates the statistics of jitter after a message with poses.
-  void FollowJitter(double now_s);
+  /// Updates the clocks and the statistics of jitter after a message with poses.
+  void FollowPoses(double server_time_s, double now_s);
 };
 
 }  // namespace stridewire::client

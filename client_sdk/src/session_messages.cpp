@@ -83,6 +83,7 @@ void Session::RestoreSession() {
   resend_from_ = 0;
   last_events_number_ = 0;
   clock_.Reset();
+  playout_.Reset();
 
   // An unanswered Observe is sent again under its command number, because its REPLY is still due.
   std::map<protocol::SubscriptionId, Command> unanswered_observes;
@@ -352,8 +353,7 @@ void Session::Handle(const protocol::PoseBatch& message, double now_s) {
   stridewire_world handle = 0;
   World* world = FindByServerId(message.info.world, handle);
   if (world == nullptr || !world->view->has_info() || world->subscriptions.empty()) return;
-  clock_.AddSample(now_s, message.info.server_time_s);
-  FollowJitter(now_s);
+  FollowPoses(message.info.server_time_s, now_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, message.info.mode);
   if (Status status = world->view->Apply(message, every_n_ticks, counts_); !status) {
     LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
@@ -368,8 +368,7 @@ void Session::Handle(const protocol::Movements& message, double now_s) {
   stridewire_world handle = 0;
   World* world = FindByServerId(message.world, handle);
   if (world == nullptr || world->replicas == nullptr) return;
-  clock_.AddSample(now_s, message.server_time_s);
-  FollowJitter(now_s);
+  FollowPoses(message.server_time_s, now_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, protocol::PoseMode::kMovement);
   if (Status status = world->view->Apply(message, *world->replicas, every_n_ticks, counts_);
       !status) {
@@ -377,7 +376,15 @@ void Session::Handle(const protocol::Movements& message, double now_s) {
   }
 }
 
-void Session::FollowJitter(double now_s) {
+void Session::FollowPoses(double server_time_s, double now_s) {
+  clock_.AddSample(now_s, server_time_s);
+  if (playout_.AddSample(now_s, server_time_s, PoseIntervalS()) && options_.render_delay_s < 0.0) {
+    ++playout_jumps_;
+    for (auto& [handle, world] : worlds_) {
+      world.view->RenumberSegments();
+      world.view->Break();
+    }
+  }
   const double late_s = clock_.last_lateness_s();
   jitter_s_ += (late_s - jitter_s_) / 64.0;
   if (late_s >= worst_jitter_s_ || now_s - worst_jitter_at_s_ > ClockMap::kWindowS) {

@@ -1,7 +1,9 @@
 #include "session_state.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 namespace stridewire::client {
@@ -108,6 +110,54 @@ std::uint64_t SessionState::EveryNTicks(const World& world, protocol::PoseMode m
     }
   }
   return every;
+}
+
+double SessionState::PoseIntervalS() const {
+  // Avatars whose poses are further apart are extrapolated, instead of delaying all others.
+  constexpr double kMaxIntervalS = 0.25;
+  std::uint64_t every = 1;
+  for (const auto& [handle, world] : worlds_) {
+    for (const auto& [id, subscription] : world.subscriptions) {
+      const protocol::Observe& observe = subscription.message;
+      every = std::max<std::uint64_t>(every, observe.every_n_ticks);
+      if (!observe.region) continue;
+      for (const auto& ring : observe.region->rings) {
+        every = std::max<std::uint64_t>(every, ring.every_n_ticks);
+      }
+    }
+  }
+  return std::min(static_cast<double>(every) / tick_hz_, kMaxIntervalS);
+}
+
+double SessionState::RenderTime(double local_s) const {
+  if (options_.render_delay_s >= 0.0) return clock_.ServerTime(local_s) - options_.render_delay_s;
+  if (playout_.ready()) return playout_.DisplayTime(local_s);
+  return clock_.ServerTime(local_s) - PlayoutClock::kFirstDelayS;
+}
+
+stridewire_playout SessionState::Playout(double local_s) const {
+  stridewire_playout p{};
+  p.displayed_poses = displayed_.poses;
+  p.extrapolated_poses = displayed_.extrapolated;
+  p.held_poses = displayed_.held;
+  p.jumps = playout_jumps_;
+  p.jitter_s = jitter_s_;
+  p.worst_jitter_s = worst_jitter_s_;
+  if (!clock_.ready()) return p;
+  const double server_s = clock_.ServerTime(local_s);
+  p.delay_s = p.target_delay_s = server_s - RenderTime(local_s);
+  if (options_.render_delay_s < 0.0 && playout_.ready()) {
+    p.target_delay_s += playout_.MissingDelay(local_s);
+  }
+  double newest_s = -std::numeric_limits<double>::infinity();
+  for (const auto& [handle, world] : worlds_) {
+    newest_s = std::max(newest_s, world.view->newest_time_s());
+  }
+  if (std::isfinite(newest_s)) {
+    p.interval_s = PoseIntervalS();
+    p.newest_age_s = std::max(0.0, server_s - newest_s);
+  }
+  return p;
 }
 
 stridewire_statistics SessionState::Statistics() const {

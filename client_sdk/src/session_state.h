@@ -16,6 +16,7 @@
 #include "clock_map.h"
 #include "event_queue.h"
 #include "library_fetch.h"
+#include "playout_clock.h"
 #include "stridewire/client.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/frame_reader.h"
@@ -37,7 +38,7 @@ struct SessionOptions {
   std::size_t max_recording_bytes = std::size_t{192} << 20;  ///< Memory of one world's recording.
   double connect_timeout_s = 5.0;
   double ping_interval_s = 1.0;
-  double render_delay_s = 0.1;
+  double render_delay_s = -1.0;  ///< Negative: the delay adapts to the link.
   bool respawn = false;
   /// True: items of replies and events of avatars become events. False: the application reads them
   /// from the messages themselves.
@@ -88,13 +89,13 @@ class SessionState {
     return worlds_.at(world).terrain;
   }
   [[nodiscard]] const ClockMap& clock() const { return clock_; }
-  [[nodiscard]] double render_delay_s() const { return options_.render_delay_s; }
+  /// Returns the server time to display at `local_s`. Requires clock().ready().
+  [[nodiscard]] double RenderTime(double local_s) const;
+  /// Describes the display at `local_s`.
+  [[nodiscard]] stridewire_playout Playout(double local_s) const;
+  [[nodiscard]] DisplayCounts& displayed() { return displayed_; }
   [[nodiscard]] double tick_hz() const { return tick_hz_; }
   [[nodiscard]] stridewire_statistics Statistics() const;
-  /// Mean lateness of messages with poses, relative to the fastest message of the last seconds.
-  [[nodiscard]] double jitter_s() const { return jitter_s_; }
-  /// Largest lateness of the last seconds.
-  [[nodiscard]] double worst_jitter_s() const { return worst_jitter_s_; }
 
  protected:
   using CommandMessage =
@@ -145,6 +146,8 @@ class SessionState {
   void UpdateFilter(World& world);
   /// Returns the shortest interval of the subscriptions that receive poses of a mode; 0: none.
   [[nodiscard]] static std::uint64_t EveryNTicks(const World& world, protocol::PoseMode mode);
+  /// Returns the longest interval of the poses that are observed, in seconds.
+  [[nodiscard]] double PoseIntervalS() const;
   [[nodiscard]] stridewire_event MakeEvent(stridewire_event_type type, stridewire_world world = 0,
                                            stridewire_status status = STRIDEWIRE_OK,
                                            std::string_view text = {}) const;
@@ -156,6 +159,8 @@ class SessionState {
   Backoff backoff_;
   EventQueue events_;
   ClockMap clock_;
+  PlayoutClock playout_;
+  DisplayCounts displayed_;
   PoseBudget pose_budget_;
   LibraryFetch libraries_;
 
@@ -208,8 +213,10 @@ class SessionState {
   std::uint64_t connects_ = 0;
   std::uint64_t resumes_ = 0;
   std::uint64_t connect_failures_ = 0;
+  std::uint64_t playout_jumps_ = 0;
+  /// Mean lateness of messages with poses, relative to the fastest message of the last seconds.
   double jitter_s_ = 0.0;
-  double worst_jitter_s_ = 0.0;
+  double worst_jitter_s_ = 0.0;  ///< Largest lateness of the last seconds.
   double worst_jitter_at_s_ = 0.0;
 };
 

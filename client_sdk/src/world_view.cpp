@@ -138,7 +138,7 @@ WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
 void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose,
                      Counts& counts) {
   stamp.discontinuity |= track.epoch != epoch_;
-  if (stamp.discontinuity) track.segment = ++last_segment_;
+  if (stamp.discontinuity || track.history->IsInterrupted()) track.segment = ++last_segment_;
   stamp.segment = track.segment;
   if (track.history->Push(stamp, pose.root_position_m, pose.rotations)) {
     ++counts.poses;
@@ -274,24 +274,48 @@ void WorldView::SetGone(Track& track, bool gone) {
   ++revision_;
 }
 
-void WorldView::SampleAll(double time_s, CrowdPose& out, std::uint64_t& held) const {
+void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displayed) {
   const std::size_t joints = skeleton_.joints.size();
   out.Resize(tracks_.size(), joints);
   std::size_t count = 0;
-  ForEach([&](protocol::AvatarId avatar, const PoseHistory& history, bool is_gone) {
+  for (auto& [avatar, track] : tracks_) {
+    PoseHistory& history = *track.history;
+    if (history.size() == 0) continue;
     const bool is_after_newest = time_s > history.stamp(history.size() - 1).time_s;
-    if (is_gone && is_after_newest) return;
+    if (track.gone && is_after_newest) continue;
     const auto rotations = std::span(out.rotations).subspan(count * joints, joints);
-    const auto sampled = history.Sample(time_s, out.roots_m[count], rotations);
-    if (!sampled) return;
+    const auto sampled = history.Display(time_s, out.roots_m[count], rotations);
+    if (!sampled) continue;
+    displayed.Add(*sampled, is_after_newest);
     const PoseStamp& stamp = history.stamp(sampled->index);
     int flags = CrowdFlagsOf(stamp);
-    if (!sampled->interpolated) flags |= kCrowdHeld;
-    if (!sampled->interpolated && is_after_newest) ++held;
+    if (sampled->extrapolated) {
+      flags |= kCrowdExtrapolated;
+    } else if (!sampled->interpolated) {
+      flags |= kCrowdHeld;
+    }
     out.avatars[count] = avatar;
     out.flags[count++] = static_cast<std::uint8_t>(flags);
-  });
+  }
   out.Resize(count, joints);
+}
+
+void WorldView::RenumberSegments() {
+  for (auto& [avatar, track] : tracks_) {
+    PoseHistory& history = *track.history;
+    std::optional<std::uint32_t> old;
+    for (std::size_t i = 0; i < history.size(); ++i) {
+      const std::uint32_t segment = history.stamp(i).segment;
+      if (old != segment) track.segment = ++last_segment_;
+      old = segment;
+      history.SetSegment(i, track.segment);
+    }
+  }
+}
+
+PoseHistory* WorldView::Find(protocol::AvatarId avatar) {
+  const auto track = tracks_.find(avatar);
+  return track == tracks_.end() ? nullptr : track->second.history.get();
 }
 
 const PoseHistory* WorldView::Find(protocol::AvatarId avatar) const {

@@ -25,6 +25,19 @@ struct PoseBudget {
   std::size_t used_bytes = 0;
 };
 
+/// Numbers of displayed poses.
+struct DisplayCounts {
+  std::uint64_t poses = 0;
+  std::uint64_t extrapolated = 0;
+  std::uint64_t held = 0;  ///< Poses after the newest pose of their avatar, when it had stopped.
+
+  void Add(const PoseHistory::Sampled& sampled, bool is_after_newest) {
+    ++poses;
+    if (sampled.extrapolated) ++extrapolated;
+    if (is_after_newest && !sampled.extrapolated) ++held;
+  }
+};
+
 /// The skeleton of a joined world and the received poses of its avatars.
 class WorldView : public PoseSink {
  public:
@@ -90,8 +103,12 @@ class WorldView : public PoseSink {
   /// ticks that arrive later are ignored.
   void Leave(protocol::AvatarId avatar, std::uint64_t tick);
 
+  /// Gives all stored poses new segments. Call it after the displayed time has jumped.
+  void RenumberSegments();
+
   /// Returns the poses of an avatar, or null if it is unknown.
   [[nodiscard]] const PoseHistory* Find(protocol::AvatarId avatar) const;
+  [[nodiscard]] PoseHistory* Find(protocol::AvatarId avatar);
   [[nodiscard]] bool IsGone(protocol::AvatarId avatar) const;
 
   /// Returns the avatars that are not gone, in ascending order.
@@ -112,9 +129,8 @@ class WorldView : public PoseSink {
   /// Clear also clears them.
   [[nodiscard]] PoseRecording& recording() { return recording_; }
 
-  /// Samples all avatars at a server time. Adds the number of poses after the newest received pose
-  /// of their avatar to `held`.
-  void SampleAll(double time_s, CrowdPose& out, std::uint64_t& held) const;
+  /// Samples all avatars at a server time, for display, and counts the poses.
+  void SampleAll(double time_s, CrowdPose& out, DisplayCounts& displayed);
 
   /// Returns whether the filter admits an avatar.
   [[nodiscard]] bool Admits(protocol::AvatarId avatar) const {

@@ -274,6 +274,21 @@ class stridewire_terrain_buffers(c.Structure):
     ]
 
 
+class stridewire_playout(c.Structure):
+    _fields_ = [
+        ("delay_s", c.c_double),
+        ("target_delay_s", c.c_double),
+        ("interval_s", c.c_double),
+        ("jitter_s", c.c_double),
+        ("worst_jitter_s", c.c_double),
+        ("newest_age_s", c.c_double),
+        ("displayed_poses", c.c_uint64),
+        ("extrapolated_poses", c.c_uint64),
+        ("held_poses", c.c_uint64),
+        ("jumps", c.c_uint64),
+    ]
+
+
 class stridewire_pose(c.Structure):
     _fields_ = [
         ("kind", c.c_int),
@@ -366,6 +381,7 @@ FUNCTIONS = {
         c.c_size_t, c.POINTER(c.c_size_t)]),
     "stridewire_client_server_time": (c.c_int, [c.c_void_p, c.POINTER(c.c_double)]),
     "stridewire_client_render_time": (c.c_int, [c.c_void_p, c.POINTER(c.c_double)]),
+    "stridewire_client_get_playout": (c.c_int, [c.c_void_p, c.POINTER(stridewire_playout)]),
     "stridewire_client_sample_pose": (c.c_int, [c.c_void_p, c.c_uint32, c.c_uint32, c.c_double,
         c.POINTER(stridewire_pose)]),
     "stridewire_client_latest_pose": (c.c_int, [c.c_void_p, c.c_uint32, c.c_uint32,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from . import _abi, _load
-from ._types import (Event, EventType, Foot, Interrupt, Kind, Outcome, Pose, PoseKind, PoseMode,
-                     Recording, Skeleton, StridewireError)
+from ._types import (Event, EventType, Foot, Interrupt, Kind, Outcome, Playout, Pose, PoseKind,
+                     PoseMode, Recording, Skeleton, StridewireError)
 
 _library = _load.load()
 _STEP, _JUMP, _STAND, _WALK = range(4)
@@ -91,7 +91,7 @@ class Client:
     MAX_EVENTS = 65536
 
     def __init__(self, address: str | Sequence[str], *, name: str = "stridewire-python",
-                 token: str = "", timeout_s: float = 10.0, render_delay_s: float = 0.1,
+                 token: str = "", timeout_s: float = 10.0, render_delay_s: float | None = None,
                  pose_history: int = 256, respawn: bool = False,
                  library_folder: str | None = None) -> None:
         texts = [address] if isinstance(address, str) else list(address)
@@ -109,7 +109,8 @@ class Client:
                               f"{_abi.ABI_VERSION}")
         options.client_name = name.encode()
         options.auth_token = token.encode()
-        options.render_delay_s = render_delay_s
+        if render_delay_s is not None:
+            options.render_delay_s = render_delay_s
         options.pose_history = pose_history
         options.respawn = respawn
         options.library_folder = library_folder.encode() if library_folder else None
@@ -154,6 +155,13 @@ class Client:
         events = list(self._events)
         self._events.clear()
         return events
+
+    def playout(self) -> Playout:
+        """Describes the delay of sampled poses and how many arrived too late."""
+        raw = _abi.stridewire_playout()
+        _check(_library.stridewire_client_get_playout(self._handle, c.byref(raw)))
+        return Playout(raw.delay_s, raw.target_delay_s, raw.jitter_s, raw.newest_age_s,
+                       raw.displayed_poses, raw.extrapolated_poses, raw.held_poses)
 
     def _last_error(self) -> str:
         text = c.create_string_buffer(1100)

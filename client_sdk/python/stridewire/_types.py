@@ -88,6 +88,7 @@ class PoseKind(enum.IntEnum):
     INTERPOLATED = 1
     HELD = 2
     RAW = 3
+    EXTRAPOLATED = 4
 
 
 class StridewireError(Exception):
@@ -158,6 +159,19 @@ class Skeleton:
                                         + rotate(turn, self.offsets_m[joint]))
             world[..., joint, :] = multiply(turn, rotations_xyzw[..., joint, :])
         return positions
+
+
+@dataclass(frozen=True)
+class Playout:
+    """How the sampled poses follow the connection. Times are 0 before the first pose."""
+
+    delay_s: float  #: Delay of the render time behind the server time.
+    target_delay_s: float  #: The delay that `delay_s` approaches.
+    jitter_s: float  #: Mean lateness of pose messages relative to the fastest one.
+    newest_age_s: float  #: Server time that has passed since the newest pose message.
+    displayed_poses: int  #: Number of sampled poses.
+    extrapolated_poses: int  #: Those after the newest pose, whose motion continued.
+    held_poses: int  #: Those after the newest pose that had stopped.
 
 
 @dataclass(frozen=True)

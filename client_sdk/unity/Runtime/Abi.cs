@@ -228,11 +228,14 @@ namespace Stridewire
         Missing = 0,
         /// <summary>Interpolated between two received poses, or equal to a received pose.</summary>
         Interpolated = 1,
-        /// <summary>The last received pose before that time. The next one has not arrived, or
-        /// follows a discontinuity.</summary>
+        /// <summary>A pose that does not move: the last one before a discontinuity, the only one,
+        /// or where EXTRAPOLATED ended.</summary>
         Held = 2,
         /// <summary>A received pose, unchanged.</summary>
         Raw = 3,
+        /// <summary>The pose after the newest one has not arrived. The motion continues and slows
+        /// down, until it stops after 0.25 s.</summary>
+        Extrapolated = 4,
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -490,6 +493,21 @@ namespace Stridewire
         public UIntPtr height_capacity;
         public stridewire_terrain_box* boxes;
         public UIntPtr box_capacity;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal unsafe struct stridewire_playout
+    {
+        public double delay_s;
+        public double target_delay_s;
+        public double interval_s;
+        public double jitter_s;
+        public double worst_jitter_s;
+        public double newest_age_s;
+        public ulong displayed_poses;
+        public ulong extrapolated_poses;
+        public ulong held_poses;
+        public ulong jumps;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -753,6 +771,11 @@ namespace Stridewire
             double* time_s);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
+        public static extern Status stridewire_client_get_playout(
+            IntPtr client,
+            stridewire_playout* playout);
+
+        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_sample_pose(
             IntPtr client,
             uint world,
@@ -806,6 +829,7 @@ namespace Stridewire
             if (sizeof(stridewire_layer_name) != 65) return "stridewire_layer_name";
             if (sizeof(stridewire_terrain) != 40) return "stridewire_terrain";
             if (sizeof(stridewire_terrain_buffers) != 32) return "stridewire_terrain_buffers";
+            if (sizeof(stridewire_playout) != 80) return "stridewire_playout";
             if (sizeof(stridewire_pose) != 72) return "stridewire_pose";
             if (sizeof(stridewire_statistics) != 136) return "stridewire_statistics";
             return null;

@@ -25,8 +25,9 @@ namespace Stridewire
         /// <summary>Secret that the server may require, or null.</summary>
         public string Token;
 
-        /// <summary>Delay of the render time behind the server time in seconds, 0 to 10.</summary>
-        public double RenderDelayS = 0.1;
+        /// <summary>Delay of the render time behind the server time in seconds, at most 10. If it
+        /// is negative, the client adapts the delay to the connection.</summary>
+        public double RenderDelayS = -1.0;
 
         /// <summary>Poses stored per avatar, 2 to 4096.</summary>
         public int PoseHistory = 32;
@@ -239,6 +240,26 @@ namespace Stridewire
             if (status == Status.NotReady) return false;
             Check(status);
             return true;
+        }
+
+        /// <summary>How the display follows the connection.</summary>
+        public Playout Playout
+        {
+            get
+            {
+                stridewire_playout native;
+                Check(Abi.stridewire_client_get_playout(Handle, &native));
+                return new Playout
+                {
+                    DelayS = native.delay_s,
+                    TargetDelayS = native.target_delay_s,
+                    JitterS = native.jitter_s,
+                    NewestAgeS = native.newest_age_s,
+                    DisplayedPoses = native.displayed_poses,
+                    ExtrapolatedPoses = native.extrapolated_poses,
+                    HeldPoses = native.held_poses,
+                };
+            }
         }
 
         internal static string StatusName(Status status)

@@ -123,7 +123,8 @@ namespace Stridewire
         public ulong Tick;
         /// <summary>Server time of this pose in seconds.</summary>
         public double TimeS;
-        /// <summary>PoseKind.Held: seconds since the last received pose.</summary>
+        /// <summary>PoseKind.Held and Extrapolated: seconds since the last received pose.
+        /// </summary>
         public double HeldS;
         /// <summary>World position of joint 0.</summary>
         public Position RootPosition;
@@ -136,6 +137,28 @@ namespace Stridewire
         /// <summary>True: the avatar stands and has no request.</summary>
         public bool Standing;
         public PoseDetail Detail;
+    }
+
+    /// <summary>How the display follows the connection. Times are 0 before the first pose.
+    /// </summary>
+    public struct Playout
+    {
+        /// <summary>Delay of the render time behind the server time in seconds.</summary>
+        public double DelayS;
+        /// <summary>The delay that DelayS approaches.</summary>
+        public double TargetDelayS;
+        /// <summary>Mean lateness of pose messages relative to the fastest one, in seconds.
+        /// </summary>
+        public double JitterS;
+        /// <summary>Server time that has passed since the newest pose message, in seconds.
+        /// </summary>
+        public double NewestAgeS;
+        /// <summary>Number of sampled poses.</summary>
+        public ulong DisplayedPoses;
+        /// <summary>Sampled poses after the newest one, whose motion continued.</summary>
+        public ulong ExtrapolatedPoses;
+        /// <summary>Sampled poses after the newest one that had stopped.</summary>
+        public ulong HeldPoses;
     }
 
     /// <summary>The joints of all avatars of a world. A joint follows its parent in the arrays.

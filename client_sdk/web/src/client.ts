@@ -89,7 +89,7 @@ export class Client {
   }
 
   get statistics(): Statistics {
-    return this.session.statistics();
+    return this.session.statistics(this.nowS());
   }
 
   /**
@@ -103,13 +103,14 @@ export class Client {
   }
 
   /**
-   * Returns the server time at which to sample poses: `serverTimeS()` minus `renderDelayS`. It
-   * advances evenly. It runs backwards only after a new session or if the server's clock jumps by
-   * more than 0.25 s.
+   * Returns the server time at which to sample poses: `serverTimeS()` minus a delay, which adapts
+   * to the connection unless `renderDelayS` is set. It runs at most 5 % faster or slower than the
+   * server. It jumps only after a new session, if the server's clock jumps by more than 0.25 s, and
+   * if all poses of a second arrived too late. Sampled poses then belong to another segment.
    */
   renderTimeS(): number | null {
-    const timeS = this.serverTimeS();
-    return timeS === null ? null : timeS - this.session.renderDelayS;
+    const timeS = this.session.renderTimeS(this.nowS());
+    return Number.isNaN(timeS) ? null : timeS;
   }
 
   /** Starts to connect and returns at once. Does nothing if already connected or connecting. */

@@ -55,7 +55,8 @@ export interface ClientOptions {
   authToken?: string;
   /** WebSocket class to use. Default: the global one. In Node.js, pass that of the package `ws`. */
   webSocket?: new (url: string) => WebSocketLike;
-  /** Delay of `Client.renderTimeS` behind server time in seconds, 0 to 60. Default 0.1. */
+  /** Delay of `Client.renderTimeS` behind server time in seconds, at most 60. If it is negative,
+   * which is the default, the delay adapts to the connection. */
   renderDelayS?: number;
   /** A clock in milliseconds that never runs backwards. Default: `performance.now`. */
   now?: () => number;
@@ -163,10 +164,17 @@ export interface Statistics {
   jitterS: number;
   /** Largest lateness of the last 4 s. */
   worstJitterS: number;
+  /** Delay of `Client.renderTimeS` behind server time now, and the delay that it approaches. */
+  renderDelayS: number;
+  targetDelayS: number;
+  /** Server time that has passed since the newest pose message. */
+  newestAgeS: number;
   /** Smoothed time from the sampled time to the newest received pose. Negative if samples are newer
-   * than all poses, so that poses are held. */
+   * than all poses, so that poses are extrapolated or held. */
   interpolationDelayS: number;
-  /** Number of samples for times after the newest received pose of their avatar. */
+  /** Samples after the newest received pose of their avatar whose motion continued. */
+  extrapolatedSamples: number;
+  /** Samples after the newest received pose of their avatar that had stopped. */
   heldSamples: number;
   /** Mean time in nanoseconds to decode and store a pose. */
   decodeNsPerPose: number;

@@ -27,8 +27,9 @@ interface Exports {
   next_event(client: number): number;
   last_error(client: number): void;
   command(client: number, world: number, bytes: number): number;
-  statistics(client: number): void;
+  statistics(client: number, nowS: number): void;
   server_time(client: number, nowS: number): number;
+  render_time(client: number, nowS: number): number;
   find_world(client: number, id: number): number;
   world_state(client: number, world: number): number;
   clear_recording(client: number, world: number): void;

@@ -99,11 +99,8 @@ export class Session {
     return this.lastErrorText;
   }
   get tickHz(): number {
-    native().call.statistics(this.client);
+    native().call.statistics(this.client, 0);
     return native().results[3]!;
-  }
-  get renderDelayS(): number {
-    return this.options.renderDelayS;
   }
   nextRequest(): bigint {
     return this.nextRequestId++;
@@ -112,6 +109,10 @@ export class Session {
   /** Returns the server time; NaN if it is not known yet. */
   serverTimeS(nowS: number): number {
     return native().call.server_time(this.client, nowS);
+  }
+  /** Returns the server time to display; NaN if it is not known yet. */
+  renderTimeS(nowS: number): number {
+    return native().call.render_time(this.client, nowS);
   }
 
   /** Starts to connect. Does nothing if already open. */
@@ -259,21 +260,25 @@ export class Session {
     }));
   }
 
-  statistics(): Statistics {
-    native().call.statistics(this.client);
+  statistics(nowS = 0): Statistics {
+    native().call.statistics(this.client, nowS);
     const {results} = native();
     const [
       bytesSent, batchesReceived, posesReceived, posesRefused, batchesMissing, batchesDropped,
       commandsSent, commandsResent, commandsWaiting, connects, resumes, connectFailures,
       bufferedBytes, rttS
     ] = [...results.subarray(16)] as Repeat14;
-    const [jitterS, worstJitterS, heldSamples] = [...results] as Repeat14;
+    const [
+      jitterS, worstJitterS, heldSamples, , renderDelayS, targetDelayS, newestAgeS,
+      extrapolatedSamples
+    ] = [...results] as Repeat14;
     let recorded = 0;
     for (const world of this.worlds) recorded += world.record.bytes;
     return {
       ...this.total, bytesSent, batchesReceived, posesReceived, posesRefused, batchesMissing,
       batchesDropped, commandsSent, commandsResent, commandsWaiting, connects, resumes,
       connectFailures, rttS, jitterS, worstJitterS, heldSamples,
+      renderDelayS, targetDelayS, newestAgeS, extrapolatedSamples,
       reconnects: Math.max(0, connects - 1),
       interpolationDelayS: this.interpolationDelayS,
       decodeNsPerPose: posesReceived === 0 ? 0 : 1e6 * this.decodeMs / posesReceived,

@@ -7,7 +7,7 @@ export type SessionOptions = Required<Omit<ClientOptions, 'url' | 'webSocket' | 
 export const defaultOptions: Omit<SessionOptions, 'seed'> = {
   clientName: 'stridewire-web',
   authToken: '',
-  renderDelayS: 0.1,
+  renderDelayS: -1,
   respawn: false,
   maxCommands: 4096,
   poseHistory: 32,
@@ -57,7 +57,7 @@ function checkNumbers(options: SessionOptions): void {
       throw new RangeError(`${name}: expected a number from ${least} to ${most}, got ${value}`);
     }
   };
-  range('renderDelayS', 0, 60);
+  range('renderDelayS', -Infinity, 60);
   range('maxCommands', 1, 1 << 20);
   range('poseHistory', 4, 4096);
   range('maxPoseBytes', 0, 2 ** 40);

@@ -497,10 +497,11 @@ export interface Skeleton {
 /**
  * Origin of a sampled pose.
  * - `interpolated`: from the received poses around the sampled time, or exactly a received one.
- * - `held`: the last pose before the sampled time, because no continuous pose follows.
+ * - `extrapolated`: the next pose has not arrived. The motion continues, and stops after 0.25 s.
+ * - `held`: a pose that does not move, because no continuous pose follows.
  * - `missing`: no pose is known for that time, and the output is not valid.
  */
-export type PoseKind = 'interpolated' | 'held' | 'missing';
+export type PoseKind = 'interpolated' | 'extrapolated' | 'held' | 'missing';
 
 /** Output buffer of `World.sample`. Create it with `createPose`. */
 export interface Pose {
@@ -516,11 +517,11 @@ export interface Pose {
   standing: boolean;
   /** Detail in which the server sent the pose. */
   detail: PoseDetail;
-  /** If the pose is held: time since the last received pose. Otherwise 0. */
+  /** If the pose is extrapolated or held: time since the last received pose. Otherwise 0. */
   heldS: number;
   /** Number of the continuous motion. If it differs from that of the pose that was displayed
-   * before, the avatar has teleported, or the client has reconnected in between: do not blend the
-   * two poses. */
+   * before, the avatar has teleported, the client has reconnected, or poses arrived after the
+   * extrapolation had ended: do not blend the two poses. */
   segment: number;
 }
 
@@ -530,12 +531,14 @@ export const PoseFlag = {
   discontinuity: 1,
   /** The avatar stands and its queue is empty. */
   standing: 2,
-  /** The pose is held instead of interpolated. */
+  /** The pose is held instead of interpolated or extrapolated. */
   held: 4,
   /** The server sent the pose with detail `reduced`. */
   reducedJoints: 8,
   /** The server sent the pose with detail `root`. */
   rootOnly: 16,
+  /** The pose is extrapolated. */
+  extrapolated: 32,
 } as const;
 
 /**

@@ -138,7 +138,7 @@ export class WorldHandle implements World {
         : (flags! & PoseFlag.rootOnly) !== 0 ? 'root' : 'all';
     out.heldS = heldS!;
     out.segment = segment!;
-    return kind === 1 ? 'interpolated' : 'held';
+    return kind === 1 ? 'interpolated' : kind === 2 ? 'held' : 'extrapolated';
   }
 
   sampleAll(timeS: number, out: CrowdPose): number {

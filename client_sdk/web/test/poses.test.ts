@@ -28,7 +28,7 @@ test('does not interpolate poses across a resume or a discontinuity', () => {
   at(90, 100);
   assert.equal(world.sample(1, 70 / 60, pose), 'held');
   assert.equal(pose.rootM[0], 50);
-  assert.equal(pose.segment, segment + 1);
+  assert.notEqual(pose.segment, segment);
   assert.ok(Math.abs(pose.heldS - 8 / 60) < 1e-9);
   assert.equal(world.recording.sampleAll(70 / 60, crowd), 1);
   assert.equal(crowd.rootsM[0], 50);

@@ -46,7 +46,6 @@ struct Client {
   std::vector<Quat> rotations;
   Vec3 root_position_m = Vec3(0.0f);
   std::vector<protocol::AvatarId> avatars;
-  std::uint64_t held = 0;  ///< Poses that were sampled after the newest pose of their avatar.
   bool has_library_cache = false;
   std::vector<std::string> libraries_to_load;  ///< Hashes for take_library_request.
   std::vector<std::string> loading_libraries;  ///< Hashes for on_library.
@@ -438,9 +437,8 @@ std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes)
   return Report(*client, status, command);
 }
 
-/// results: 0 mean and 1 worst jitter, 2 held poses, 3 ticks per second, and from 16 on the numbers
-/// in the order in which they are written here.
-STRIDEWIRE_EXPORT(statistics) void Statistics(Client* client) {
+/// results: the numbers in the order in which they are written here, from 0 and from 16 on.
+STRIDEWIRE_EXPORT(statistics) void Statistics(Client* client, double now_s) {
   const stridewire_statistics s = client->session.Statistics();
   const double numbers[] = {
       static_cast<double>(s.bytes_sent),       static_cast<double>(s.batches_received),
@@ -451,16 +449,29 @@ STRIDEWIRE_EXPORT(statistics) void Statistics(Client* client) {
       static_cast<double>(s.resumes),          static_cast<double>(s.connect_failures),
       static_cast<double>(s.buffered_bytes),   s.rtt_s};
   std::memcpy(results.data() + 16, numbers, sizeof numbers);
-  results[0] = client->session.jitter_s();
-  results[1] = client->session.worst_jitter_s();
-  results[2] = static_cast<double>(client->held);
-  results[3] = client->session.tick_hz();
+  const stridewire_playout p = client->session.Playout(now_s);
+  const double playout[] = {p.jitter_s,
+                            p.worst_jitter_s,
+                            static_cast<double>(p.held_poses),
+                            client->session.tick_hz(),
+                            p.delay_s,
+                            p.target_delay_s,
+                            p.newest_age_s,
+                            static_cast<double>(p.extrapolated_poses)};
+  std::memcpy(results.data(), playout, sizeof playout);
 }
 
 /// Returns the server time at `now_s`; NaN if it is not known yet.
 STRIDEWIRE_EXPORT(server_time) double ServerTime(Client* client, double now_s) {
   const ClockMap& clock = client->session.clock();
   return clock.ready() ? clock.ServerTime(now_s) : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Returns the server time to display at `now_s`; NaN if it is not known yet.
+STRIDEWIRE_EXPORT(render_time) double RenderTime(Client* client, double now_s) {
+  const Session& session = client->session;
+  return session.clock().ready() ? session.RenderTime(now_s)
+                                 : std::numeric_limits<double>::quiet_NaN();
 }
 
 // ---- worlds
@@ -497,22 +508,23 @@ STRIDEWIRE_EXPORT(avatars) std::size_t Avatars(Client* client, stridewire_world 
   return client->avatars.size();
 }
 
-/// Samples one avatar. Returns 0 if its pose is missing, 1 if it is interpolated and 2 if it is
-/// held. results: 0 number of joints, 1 address of the root's position, 2 address of the rotations,
-/// 3 tick, 4 flags (CrowdFlags), 5 time since the last pose if it is held, 6 segment.
+/// Samples one avatar. Returns 0 if its pose is missing, 1 if it is interpolated, 2 if it is held
+/// and 3 if it is extrapolated. results: 0 number of joints, 1 address of the root's position,
+/// 2 address of the rotations, 3 tick, 4 flags (CrowdFlags), 5 time since the last pose if the
+/// result is not 1, 6 segment.
 STRIDEWIRE_EXPORT(sample)
 std::uint32_t Sample(Client* client, stridewire_world world, protocol::AvatarId avatar,
                      double time_s) {
-  const WorldView* view = client->session.FindWorld(world);
-  const PoseHistory* history = view == nullptr ? nullptr : view->Find(avatar);
+  WorldView* view = client->session.FindWorld(world);
+  PoseHistory* history = view == nullptr ? nullptr : view->Find(avatar);
   if (history == nullptr || history->size() == 0) return 0;
   const bool is_after_newest = time_s > history->stamp(history->size() - 1).time_s;
   if (view->IsGone(avatar) && is_after_newest) return 0;
   client->rotations.resize(history->joint_count());
-  const auto sampled = history->Sample(time_s, client->root_position_m, client->rotations);
+  const auto sampled = history->Display(time_s, client->root_position_m, client->rotations);
   if (!sampled) return 0;
   const PoseStamp& stamp = history->stamp(sampled->index);
-  if (!sampled->interpolated && is_after_newest) ++client->held;
+  client->session.displayed().Add(*sampled, is_after_newest);
   results[0] = static_cast<double>(history->joint_count());
   results[1] = static_cast<double>(reinterpret_cast<std::uintptr_t>(&client->root_position_m));
   results[2] = Address(client->rotations);
@@ -520,7 +532,7 @@ std::uint32_t Sample(Client* client, stridewire_world world, protocol::AvatarId 
   results[4] = CrowdFlagsOf(stamp);
   results[5] = sampled->interpolated ? 0.0 : time_s - stamp.time_s;
   results[6] = stamp.segment;
-  return sampled->interpolated ? 1 : 2;
+  return sampled->interpolated ? 1 : sampled->extrapolated ? 3 : 2;
 }
 
 /// Samples all avatars of a world and returns their number, from the recording if `recorded`.
@@ -536,7 +548,7 @@ std::size_t SampleAll(Client* client, stridewire_world world, double time_s, boo
     view->recording().SampleAll(
         time_s, [view](protocol::AvatarId avatar) { return view->Admits(avatar); }, crowd);
   } else {
-    view->SampleAll(time_s, crowd, client->held);
+    view->SampleAll(time_s, crowd, client->session.displayed());
   }
   SetCrowdResults(crowd);
   return crowd.avatars.size();

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "child_process.h"
+#include "link_proxy.h"
 #include "ready_line.h"
 #include "run_program.h"
 #include "scratch_folder.h"
@@ -549,8 +550,7 @@ class RestartObserver {
     }
     ++samples_;
     if (has_last_ && pose_.segment == last_.segment) {
-      // A held pose is as old as the last received one, so the next one can be further away.
-      const double elapsed_s = (pose_.time_s - pose_.held_s) - (last_.time_s - last_.held_s);
+      const double elapsed_s = pose_.time_s - last_.time_s;
       const double moved_m = std::hypot(pose_.root_position_m[0] - last_.root_position_m[0],
                                         pose_.root_position_m[2] - last_.root_position_m[2]);
       EXPECT_GE(elapsed_s, -1e-9);
@@ -619,6 +619,147 @@ TEST(ClientAndServer, SurvivesManyRestarts) {
   observer.Check();
   observer.Print(restarts);
   EXPECT_EQ(user.client.Statistics().connects, static_cast<std::uint64_t>(restarts) + 1);
+}
+
+/// Displays an avatar and measures how far its joints move between two frames.
+class DisplayedSteps {
+ public:
+  explicit DisplayedSteps(User& user) : user_(user) {}
+
+  void Display() {
+    if (skeleton_.joints.empty()) (void)user_.client.GetSkeleton(user_.world, skeleton_);
+    const auto time_s = user_.client.RenderTime();
+    if (!time_s || !user_.client.SamplePose(user_.world, 1, *time_s, pose_) || pose_.missing()) {
+      return;
+    }
+    const std::vector<Vec3> joints_m = JointPositions();
+    largest_m_s_.resize(joints_m.size());
+    const double elapsed_s = pose_.time_s - last_time_s_;
+    if (!last_m_.empty() && pose_.segment == last_segment_) {
+      // Frames that are closer than those of a display with 120 Hz are compared with one of these.
+      const auto frame_s = static_cast<float>(std::max(elapsed_s, 1.0 / 120.0));
+      for (std::size_t j = 0; j < joints_m.size(); ++j) {
+        largest_m_s_[j] =
+            std::max(largest_m_s_[j], glm::length(joints_m[j] - last_m_[j]) / frame_s);
+      }
+    } else {
+      ++segments_;
+    }
+    last_m_ = joints_m;
+    last_time_s_ = pose_.time_s;
+    last_segment_ = pose_.segment;
+    delays_s_.push_back(user_.client.Playout().delay_s);
+  }
+
+  [[nodiscard]] double RatioTo(const DisplayedSteps& clean) const {
+    double ratio = 0.0;
+    for (std::size_t j = 0; j < largest_m_s_.size(); ++j) {
+      ratio = std::max<double>(ratio, largest_m_s_[j] / clean.largest_m_s_.at(j));
+    }
+    return ratio;
+  }
+  [[nodiscard]] int segments() const { return segments_; }
+  /// Returns the delay of which a part of the frames is not longer.
+  [[nodiscard]] double DelayS(double part) {
+    std::ranges::sort(delays_s_);
+    return delays_s_.at(static_cast<std::size_t>(part * static_cast<double>(delays_s_.size() - 1)));
+  }
+
+ private:
+  [[nodiscard]] std::vector<Vec3> JointPositions() const {
+    std::vector<Vec3> positions_m;
+    std::vector<Quat> rotations;
+    for (std::size_t j = 0; j < skeleton_.joints.size(); ++j) {
+      const auto& r = pose_.rotations[j];
+      const Quat local(r.w, r.x, r.y, r.z);
+      const stridewire_joint& joint = skeleton_.joints[j];
+      const auto& root = pose_.root_position_m;
+      if (joint.parent < 0) {
+        positions_m.emplace_back(root[0], root[1], root[2]);
+        rotations.push_back(local);
+        continue;
+      }
+      const auto parent = static_cast<std::size_t>(joint.parent);
+      const Vec3 offset_m(joint.offset_m[0], joint.offset_m[1], joint.offset_m[2]);
+      positions_m.push_back(positions_m[parent] + rotations[parent] * offset_m);
+      rotations.push_back(rotations[parent] * local);
+    }
+    return positions_m;
+  }
+
+  User& user_;
+  client::Skeleton skeleton_;
+  client::Pose pose_;
+  std::vector<Vec3> last_m_;
+  double last_time_s_ = 0.0;
+  std::uint32_t last_segment_ = 0;
+  std::vector<float> largest_m_s_;
+  std::vector<double> delays_s_;
+  int segments_ = 0;
+};
+
+// STRIDEWIRE_LINK_MINUTES sets the length of the test; the links then stall and are cut less often.
+TEST(ClientAndServer, DisplaysSmoothlyThroughABadLink) {
+  const char* minutes = std::getenv("STRIDEWIRE_LINK_MINUTES");
+  const double length_s = minutes != nullptr ? 60.0 * std::atof(minutes) : 14.0;
+  const std::uint64_t seed = 7;
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  test::LinkProxy::Link link{.latency_s = 0.1, .jitter_s = 0.05, .stall_s = 2.0};
+  link.stall_every_s = minutes != nullptr ? 17.0 : 9.0;
+  link.cut_every_s = minutes != nullptr ? 10.0 : 4.0;
+  test::LinkProxy proxy(server.port(), link, seed);
+  ASSERT_NE(proxy.port(), 0);
+  User walker(server.port());
+  walker.Spawn(1);
+  ASSERT_TRUE(walker.client.Observe(walker.world));
+  User observer(proxy.port(), STRIDEWIRE_OBSERVER);
+  ASSERT_TRUE(observer.client.Observe(observer.world));
+  DisplayedSteps clean(walker);
+  DisplayedSteps displayed(observer);
+  const auto start = std::chrono::steady_clock::now();
+  const auto passed_s = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  std::uint64_t steps = 0;
+  double lost_s = 0.0;
+  double slowest_s = 0.0;
+  stridewire_event event;
+  std::uint64_t last_poses = 0;
+  while (passed_s() < length_s) {
+    while (walker.client.PollEvent(event)) {
+    }
+    while (observer.client.PollEvent(event)) {
+      if (event.type == STRIDEWIRE_EVENT_CONNECTION_LOST) lost_s = passed_s();
+    }
+    // A step takes about half a second.
+    for (; static_cast<double>(steps) < 2.0 * passed_s() + 8.0; ++steps) {
+      const double length_m = steps % 3 == 0 ? 0.45 : 0.6;
+      ASSERT_TRUE(walker.client.Request(walker.world, {client::Step(1, steps + 1, length_m)}));
+    }
+    if (const auto poses = observer.client.Statistics().poses_received; poses > last_poses) {
+      last_poses = poses;
+      if (lost_s > 0.0) slowest_s = std::max(slowest_s, passed_s() - lost_s);
+      lost_s = 0.0;
+    }
+    clean.Display();
+    displayed.Display();
+    std::this_thread::sleep_for(std::chrono::milliseconds(16));
+  }
+  const stridewire_playout playout = observer.client.Playout();
+  std::printf(
+      "%.0f s: largest step %.2f of the clean stream, %d segments, %d cuts, %d stalls, slowest "
+      "recovery %.2f s; %llu of %llu poses extrapolated, %llu held; delay beyond the fastest "
+      "message %.0f ms (median), %.0f ms (95 %%); clean: %.0f and %.0f ms\n",
+      length_s, displayed.RatioTo(clean), displayed.segments(), proxy.cuts(), proxy.stalls(),
+      slowest_s, static_cast<unsigned long long>(playout.extrapolated_poses),
+      static_cast<unsigned long long>(playout.displayed_poses),
+      static_cast<unsigned long long>(playout.held_poses), 1e3 * displayed.DelayS(0.5),
+      1e3 * displayed.DelayS(0.95), 1e3 * clean.DelayS(0.5), 1e3 * clean.DelayS(0.95));
+  EXPECT_GE(proxy.cuts(), 2);
+  EXPECT_GE(proxy.stalls(), 1);
+  EXPECT_LE(displayed.RatioTo(clean), 2.0);
 }
 
 // ---- stridewire-record

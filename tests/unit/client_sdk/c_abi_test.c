@@ -217,6 +217,18 @@ OFFSET(stridewire_pose, rotations_xyzw, 48);
 OFFSET(stridewire_pose, joint_capacity, 56);
 OFFSET(stridewire_pose, segment, 64);
 
+SIZE(stridewire_playout, 80);
+OFFSET(stridewire_playout, delay_s, 0);
+OFFSET(stridewire_playout, target_delay_s, 8);
+OFFSET(stridewire_playout, interval_s, 16);
+OFFSET(stridewire_playout, jitter_s, 24);
+OFFSET(stridewire_playout, worst_jitter_s, 32);
+OFFSET(stridewire_playout, newest_age_s, 40);
+OFFSET(stridewire_playout, displayed_poses, 48);
+OFFSET(stridewire_playout, extrapolated_poses, 56);
+OFFSET(stridewire_playout, held_poses, 64);
+OFFSET(stridewire_playout, jumps, 72);
+
 SIZE(stridewire_statistics, 136);
 OFFSET(stridewire_statistics, bytes_received, 0);
 OFFSET(stridewire_statistics, bytes_sent, 8);

@@ -124,17 +124,94 @@ TEST(PoseHistory, NeverInterpolatesAcrossADiscontinuity) {
   }
 }
 
-TEST(PoseHistory, HoldsTheNewestPoseAndIsEmptyBeforeTheOldest) {
+TEST(PoseHistory, ExtrapolatesUntilItStops) {
   const PoseHistory history = Moving(16, 10);
+  const double newest_s = history.stamp(9).time_s;
+  const Vec3 newest_m = history.root_position_m(9);
+  Vec3 last_m = newest_m;
+  Rotations rotations;
+  float last_step_m = 1.0f;
+  for (int i = 1; i <= 26; ++i) {
+    Vec3 root_m;
+    const auto sampled = history.Sample(newest_s + 0.01 * i, root_m, rotations);
+    ASSERT_TRUE(sampled);
+    EXPECT_EQ(sampled->index, 9u);
+    EXPECT_FALSE(sampled->interpolated);
+    EXPECT_EQ(sampled->extrapolated, i < 25) << i;
+    // The speed is that before the newest pose, and decreases.
+    const float step_m = glm::length(root_m - last_m);
+    EXPECT_LT(step_m, last_step_m);
+    if (i == 1) {
+      const Vec3 before_m = newest_m - history.root_position_m(8);
+      EXPECT_NEAR(step_m, 0.01f * 60.0f * glm::length(before_m), 0.002f);
+    }
+    last_step_m = step_m > 0.0f ? step_m : 1e-6f;
+    last_m = root_m;
+  }
+  Vec3 root_m;
+  ASSERT_TRUE(history.Sample(100.0, root_m, rotations));
+  EXPECT_EQ(root_m, last_m);
+}
+
+TEST(PoseHistory, HoldsASinglePoseAndIsEmptyBeforeTheOldest) {
+  const PoseHistory history = Moving(16, 1);
   Vec3 root_m;
   Rotations rotations;
   EXPECT_FALSE(history.Sample(-0.001, root_m, rotations));
   const auto late = history.Sample(100.0, root_m, rotations);
   ASSERT_TRUE(late);
-  EXPECT_FALSE(late->interpolated);
-  EXPECT_EQ(late->index, 9u);
-  EXPECT_EQ(root_m, history.root_position_m(9));
+  EXPECT_FALSE(late->interpolated || late->extrapolated);
+  EXPECT_EQ(root_m, history.root_position_m(0));
   EXPECT_FALSE(PoseHistory(4, kJoints).Sample(0.0, root_m, rotations));
+}
+
+/// Displays at 1 kHz while pose i arrives `delay_s(i)` after its time, and returns the largest
+/// change of the root's velocity between two frames, in m/s.
+template <typename Delay>
+float LargestVelocityChange(double display_delay_s, const Delay& delay_s, int& extrapolated) {
+  constexpr double kEveryS = 1.0 / 30.0;
+  PoseHistory history(16, kJoints);
+  int next = 0;
+  float largest_m_s = 0.0f;
+  std::array<Vec3, 2> last_m{};
+  int frames = 0;
+  Rotations rotations;
+  for (double now_s = 0.0; now_s < 3.0; now_s += 1e-3) {
+    for (; next * kEveryS + delay_s(next) <= now_s; ++next) {
+      const double t = next * kEveryS;
+      history.Push({static_cast<std::uint64_t>(next + 1), t, false, 0, false}, RootAt(t),
+                   RotationsAt(t));
+    }
+    Vec3 root_m;
+    const auto sampled = history.Display(now_s - display_delay_s, root_m, rotations);
+    if (!sampled) continue;
+    extrapolated += sampled->extrapolated ? 1 : 0;
+    if (++frames > 100) {
+      const Vec3 change_m = root_m - 2.0f * last_m[1] + last_m[0];
+      largest_m_s = std::max(largest_m_s, glm::length(change_m) / 1e-3f);
+    }
+    last_m = {last_m[1], root_m};
+  }
+  return largest_m_s;
+}
+
+TEST(PoseHistory, VelocityIsContinuousIfTheNextPoseIsMissing) {
+  // Each interval is displayed before the pose after it has arrived.
+  int extrapolated = 0;
+  const float change_m_s =
+      LargestVelocityChange(1.0 / 30.0 + 0.005, [](int) { return 0.0; }, extrapolated);
+  EXPECT_EQ(extrapolated, 0);
+  // The root accelerates by at most 4 m/s^2; a change of the curve would be a multiple of this.
+  EXPECT_LT(change_m_s, 0.02f);
+}
+
+TEST(PoseHistory, LatePosesDoNotJump) {
+  int extrapolated = 0;
+  const float change_m_s = LargestVelocityChange(
+      1.0 / 30.0 + 0.005, [](int i) { return i >= 40 && i < 45 ? 0.15 : 0.0; }, extrapolated);
+  EXPECT_GT(extrapolated, 50);
+  // A jump by 0.1 m between two frames would be a change of the velocity by 100 m/s.
+  EXPECT_LT(change_m_s, 1.6f);
 }
 
 TEST(PoseHistory, DropsTheOldestPoseWhenFull) {

@@ -44,7 +44,7 @@ class PoseRecordingTest : public testing::Test {
   std::unique_ptr<WorldView> view_;
   CrowdPose live_;
   CrowdPose recorded_;
-  std::uint64_t held_ = 0;
+  DisplayCounts held_;
 };
 
 TEST_F(PoseRecordingTest, SamplesEqualLivePoses) {

@@ -208,7 +208,7 @@ protocol::WorldInfo DescribeWorld(const MotionLibrary& library) {
 double LargestRecordedErrorM(WorldView& view, double from_s, double to_s, std::size_t avatars) {
   CrowdPose live;
   CrowdPose recorded;
-  std::uint64_t held = 0;
+  DisplayCounts held;
   double largest_m = 0.0;
   for (double time_s = from_s; time_s <= to_s; time_s += 0.25) {
     view.SampleAll(time_s, live, held);

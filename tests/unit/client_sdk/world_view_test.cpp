@@ -70,7 +70,7 @@ TEST_F(WorldViewTest, SamplesAllAvatarsAtATime) {
   ASSERT_TRUE(Take(62, {{2, protocol::kPoseStanding}}));
   EXPECT_EQ(view_.newest_time_s(), test_world::TickTime(62));
   CrowdPose crowd;
-  std::uint64_t held = 0;
+  DisplayCounts held;
   view_.SampleAll(60.5 / 60.0, crowd, held);
   EXPECT_EQ(crowd.avatars, (std::vector<std::uint32_t>{1, 2}));
   // The first poses continue nothing.
@@ -78,13 +78,13 @@ TEST_F(WorldViewTest, SamplesAllAvatarsAtATime) {
             (std::vector<std::uint8_t>{kCrowdDiscontinuity, kCrowdDiscontinuity | kCrowdStanding}));
   EXPECT_NEAR(crowd.roots_m[1].z, test_world::RootAt(60.5 / 60.0, 2).z, 1e-5f);
   EXPECT_EQ(crowd.rotations.size(), 2u * test_world::kJoints);
-  EXPECT_EQ(held, 0u);
+  EXPECT_EQ(held.extrapolated + held.held, 0u);
   view_.SampleAll(61.5 / 60.0, crowd, held);
   EXPECT_EQ(crowd.flags, std::vector<std::uint8_t>{kCrowdStanding});  // Avatar 1 is gone.
   view_.SampleAll(62.5 / 60.0, crowd, held);
   EXPECT_EQ(crowd.avatars, std::vector<std::uint32_t>{2});
-  EXPECT_EQ(crowd.flags[0], kCrowdStanding | kCrowdHeld);
-  EXPECT_EQ(held, 1u);
+  EXPECT_EQ(crowd.flags[0], kCrowdStanding | kCrowdExtrapolated);
+  EXPECT_EQ(held.extrapolated + held.held, 1u);
   view_.SampleAll(59.0 / 60.0, crowd, held);
   EXPECT_TRUE(crowd.avatars.empty());
 }

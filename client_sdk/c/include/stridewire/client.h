@@ -81,7 +81,8 @@ typedef struct stridewire_client_options {
   /// Memory for all pose histories in bytes, at least 64 KiB. Poses of avatars that do not fit are
   /// dropped and counted in `poses_refused`. Default 256 MiB.
   size_t max_pose_bytes;
-  /// Delay of the render time behind the server time in seconds, 0 to 10. Default 0.1.
+  /// Delay of the render time behind the server time in seconds, at most 10. If it is negative,
+  /// which is the default, the client adapts the delay to the connection.
   double render_delay_s;
   /// Timeout for the TCP connection and for the handshake, each in seconds, 0.01 to 600. Default 5.
   double connect_timeout_s;
@@ -685,20 +686,43 @@ stridewire_status stridewire_client_list_avatars(stridewire_client* client, stri
 /// with NOT_READY before the first pose or pong.
 stridewire_status stridewire_client_server_time(stridewire_client* client, double* time_s);
 
-/// Gets the time at which to sample poses: the server time minus `render_delay_s`. It advances
-/// evenly and moves backwards only in a new session or when the server's clock jumps by more than
-/// 0.25 s.
+/// Gets the time at which to sample poses: the server time minus a delay. The client chooses the
+/// smallest delay with which poses arrive in time, and changes it smoothly: render time runs at
+/// most 5 % faster or slower than the server. It jumps only in a new session, after the server's
+/// clock has changed by more than 0.25 s, and if all poses of a second arrived too late. Sampled
+/// poses then belong to another segment.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
+
+/// How the display follows the connection. Times are 0 before the first pose.
+typedef struct stridewire_playout {
+  double delay_s;               ///< Delay of the render time behind the server time.
+  double target_delay_s;        ///< The delay that `delay_s` approaches.
+  double interval_s;            ///< Longest interval of the observed poses, at most 0.25 s.
+  double jitter_s;              ///< Mean lateness of pose messages relative to the fastest one.
+  double worst_jitter_s;        ///< Largest lateness of the last 4 s.
+  double newest_age_s;          ///< Server time that has passed since the newest pose message.
+  uint64_t displayed_poses;     ///< Number of sampled poses.
+  uint64_t extrapolated_poses;  ///< Those after the newest pose, whose motion continued.
+  uint64_t held_poses;          ///< Those after the newest pose that had stopped.
+  uint64_t jumps;               ///< Jumps of the render time within a session.
+} stridewire_playout;
+
+/// Gets the state of the display.
+stridewire_status stridewire_client_get_playout(stridewire_client* client,
+                                                stridewire_playout* playout);
 
 /// Origin of a sampled pose.
 typedef enum stridewire_pose_kind {
   STRIDEWIRE_POSE_MISSING = 0,  ///< No pose is known for that time. Other fields are 0.
   /// Interpolated between two received poses, or equal to a received pose.
   STRIDEWIRE_POSE_INTERPOLATED = 1,
-  /// The last received pose before that time. The next one has not arrived, or follows a
-  /// discontinuity.
+  /// A pose that does not move: the last one before a discontinuity, the only one, or where
+  /// EXTRAPOLATED ended.
   STRIDEWIRE_POSE_HELD = 2,
-  STRIDEWIRE_POSE_RAW = 3  ///< A received pose, unchanged.
+  STRIDEWIRE_POSE_RAW = 3,  ///< A received pose, unchanged.
+  /// The pose after the newest one has not arrived. The motion continues and slows down, until it
+  /// stops after 0.25 s.
+  STRIDEWIRE_POSE_EXTRAPOLATED = 4
 } stridewire_pose_kind;
 
 /// A pose. The caller sets `rotations_xyzw` and `joint_capacity` before a call; the call writes all
@@ -708,7 +732,7 @@ typedef struct stridewire_pose {
   uint32_t joint_count;
   uint64_t tick;  ///< Tick of the last received pose at or before `time_s`.
   double time_s;  ///< Server time of this pose.
-  double held_s;  ///< HELD: seconds since the last received pose.
+  double held_s;  ///< HELD and EXTRAPOLATED: seconds since the last received pose.
   float root_position_m[3];
   /// RAW: 1 if clients must not interpolate between the previous pose and this one.
   uint8_t discontinuity;
@@ -719,8 +743,9 @@ typedef struct stridewire_pose {
   float* rotations_xyzw;
   size_t joint_capacity;  ///< Set by the caller: number of joints that `rotations_xyzw` can hold.
   /// Number of the continuous motion to which the pose belongs. Sampled poses have it as well. If
-  /// it differs from that of the pose that was displayed before, the avatar has teleported, or the
-  /// client has reconnected in between: the application must not blend the two poses.
+  /// it differs from that of the pose that was displayed before, the avatar has teleported, the
+  /// client has reconnected, or poses arrived after the extrapolation had ended: the application
+  /// must not blend the two poses.
   uint32_t segment;
 } stridewire_pose;
 

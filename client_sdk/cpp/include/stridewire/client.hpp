@@ -386,6 +386,13 @@ class Client {
     });
   }
 
+  /// Describes the delay of the display and how many poses arrived too late.
+  stridewire_playout Playout() const {
+    stridewire_playout playout{};
+    (void)stridewire_client_get_playout(handle_, &playout);
+    return playout;
+  }
+
   stridewire_statistics Statistics() const {
     stridewire_statistics statistics{};
     (void)stridewire_client_get_statistics(handle_, &statistics);

@@ -26,8 +26,12 @@ export class StatisticsPanel {
     'Bytes received per second');
   private readonly delay = new Plot('Interpolation delay', (v) => `${v.toFixed(0)} ms`,
     'How far the shown time is behind the newest pose');
+  private readonly jitter = new Plot('Jitter', (v) => `${v.toFixed(1)} ms`,
+    'Mean lateness of pose messages relative to the fastest message of the last seconds');
+  private readonly age = new Plot('Age of newest pose', (v) => `${v.toFixed(0)} ms`,
+    'Server time that has passed since the newest pose message');
   private readonly missed = new Plot('Missed poses', (v) => `${v.toFixed(0)}/s`,
-    'Poses per second that had not arrived when they were needed');
+    'Poses per second that had not arrived when they were needed, so that they were extrapolated');
   private readonly frames = new Plot('Frame rate', (v) => `${v.toFixed(0)} fps`,
     'Frames drawn per second');
   private readonly summary = h('p', {class: 'hint'});
@@ -41,7 +45,8 @@ export class StatisticsPanel {
     private readonly metricsUrl: string, private readonly statistics: () => Statistics,
     private readonly describe: () => string) {
     this.element = h('div', {class: 'panel-body'}, this.tick.element, this.bytes.element,
-      this.delay.element, this.missed.element, this.frames.element, this.summary);
+      this.delay.element, this.jitter.element, this.age.element, this.missed.element,
+      this.frames.element, this.summary);
   }
 
   /** Call once per frame. While the panel is not visible, /metrics is not fetched. */
@@ -49,7 +54,8 @@ export class StatisticsPanel {
     if (nowMs - this.lastMs < updateIntervalMs) return;
     this.lastMs = nowMs;
     const s = this.statistics();
-    const now = {ms: nowMs, bytes: s.bytesReceived, missed: s.heldSamples, frames: framesDrawn};
+    const missed = s.heldSamples + s.extrapolatedSamples;
+    const now = {ms: nowMs, bytes: s.bytesReceived, missed, frames: framesDrawn};
     if (this.before) {
       const seconds = (now.ms - this.before.ms) / 1000;
       this.current.bytesPerS = (now.bytes - this.before.bytes) / seconds;
@@ -60,11 +66,14 @@ export class StatisticsPanel {
       this.missed.add(this.current.missedPerS);
       this.frames.add(this.current.framesPerS);
       this.delay.add(this.current.interpolationDelayMs);
+      this.jitter.add(s.jitterS * 1000);
+      this.age.add(s.newestAgeS * 1000);
     }
     this.before = now;
     if (visible) {
       void this.scrape();
-      for (const plot of [this.tick, this.bytes, this.delay, this.missed, this.frames]) plot.draw();
+      const {tick, bytes, delay, jitter, age, missed, frames} = this;
+      for (const plot of [tick, bytes, delay, jitter, age, missed, frames]) plot.draw();
       setText(this.summary, this.describe());
     }
   }

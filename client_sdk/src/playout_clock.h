@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace stridewire::client {
+
+/// Determines which server time to display, so that poses arrive just before they are displayed.
+///
+/// A message with server time s that arrives at local time l has the offset l - s. The display
+/// shows server time l - d at local time l. It is not ahead of the newest pose if d is at least the
+/// offset of the next message plus the interval of the messages:
+///
+///   target = offset that kQuantile of the last kWindowS do not exceed + (1 + kMargin) * interval
+///
+/// d approaches the target at a rate of at most kMaxRate, so that the display runs at most 5 %
+/// faster or slower than the server. It jumps only if the server's clock has changed, or if all
+/// messages of the last kResyncS arrived too late by more than kSnapS.
+///
+/// A delay cannot cover a stall of the link. The messages that arrive after one do not count until
+/// they are on time again.
+class PlayoutClock {
+ public:
+  static constexpr double kWindowS = 1.5;
+  /// Largest number of offsets in the window. With more ticks per second, it is shorter.
+  static constexpr std::size_t kMaxOffsets = 256;
+  /// Part of a normal distribution that exceeds its mean by at most two standard deviations.
+  static constexpr double kQuantile = 0.977;
+  /// Largest difference between the speeds of the display and of the server.
+  static constexpr double kMaxRate = 0.05;
+  /// Close to the target, the difference decays with this time constant.
+  static constexpr double kDecayS = 0.25;
+  /// Part of an interval that is added to the delay.
+  static constexpr double kMargin = 0.25;
+  /// Delay after the first message, until the window is full.
+  static constexpr double kFirstDelayS = 0.1;
+  /// A longer pause between messages is a stall, if it exceeds three intervals.
+  static constexpr double kStallS = 0.4;
+  static constexpr double kResyncS = 1.0;
+  /// If an offset is smaller than all others of the window by more than this, the server's clock
+  /// has changed, or the local clock was stopped.
+  static constexpr double kSnapS = 0.25;
+
+  /// Adds a message with poses of server time `server_s` that arrived at `local_s`, from a stream
+  /// with this interval. Local times never decrease. Returns true if the displayed time jumped.
+  bool AddSample(double local_s, double server_s, double interval_s);
+
+  /// Must be called after a lost connection. It counts as a stall.
+  void OnStall(double local_s);
+
+  [[nodiscard]] bool ready() const { return ready_; }
+  /// Returns the server time to display at `local_s`. Requires ready().
+  [[nodiscard]] double DisplayTime(double local_s) const { return local_s - OffsetAt(local_s); }
+  /// Difference between the target of `d` and its value at `local_s`. Requires ready().
+  [[nodiscard]] double MissingDelay(double local_s) const { return target_s_ - OffsetAt(local_s); }
+  [[nodiscard]] double interval_s() const { return interval_s_; }
+
+  void Reset() { *this = PlayoutClock(); }
+
+ private:
+  struct Offset {
+    double local_s = 0.0;
+    double server_s = 0.0;
+    double offset_s = 0.0;
+  };
+
+  [[nodiscard]] double OffsetAt(double local_s) const;
+  void Start(double local_s, double offset_s);
+  void Store(const Offset& offset);
+
+  /// The last offsets, one per server time. A tick may consist of several messages.
+  std::array<Offset, kMaxOffsets> offsets_;
+  std::size_t first_ = 0;
+  std::size_t count_ = 0;
+  bool ready_ = false;
+  bool stalled_ = false;
+  double first_local_s_ = 0.0;
+  double first_offset_s_ = 0.0;
+  double smallest_s_ = 0.0;  ///< Smallest offset in the window.
+  double stalled_since_s_ = 0.0;
+  double last_on_time_s_ = 0.0;  ///< Local time of the last message that was not too late.
+  double last_local_s_ = 0.0;
+  double at_local_s_ = 0.0;  ///< Local time for which `offset_s_` is valid.
+  double offset_s_ = 0.0;    ///< d
+  double target_s_ = 0.0;
+  double interval_s_ = 0.0;
+};
+
+}  // namespace stridewire::client
