@@ -1,0 +1,46 @@
+#!/usr/bin/env python3
+"""Counts the hand-written lines that describe the messages of the wire protocol.
+
+    tests/tools/count_wire_lines.py            # prints the lines of each file and their sum
+
+A file counts if a new field of a message may have to be added to it, or if it contains functions
+that such code calls: the schema, message structs, encoders, decoders, checks, JSON and samples of
+the test vectors, in C++ and TypeScript. All its lines count, with comments and empty lines.
+Generated files and the generator do not count. The codecs of poses, framing and the public types of
+the client libraries do not count either.
+"""
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+PATTERNS = {
+    "schema": ["protocol/schema/*.fbs"],
+    "message structs": ["protocol/include/stridewire/protocol/message*.h"],
+    "encoders and decoders": [
+        "protocol/include/stridewire/protocol/encoder.h", "protocol/src/encoder.cpp",
+        "protocol/include/stridewire/protocol/decode.h", "protocol/src/decode.cpp",
+        "protocol/src/request_codec.cpp", "protocol/src/request_fields.h",
+        "protocol/src/codec_support.h", "protocol/src/unpacker.h"],
+    "checks": ["protocol/include/stridewire/protocol/check.h", "protocol/src/check.cpp",
+               "protocol/src/findings.*"],
+    "JSON and vectors": ["protocol/tools/*.cpp", "protocol/tools/*.h"],
+    "TypeScript": ["client_sdk/web/src/wire/*.ts", "client_sdk/web/test/support/to_json.ts"],
+}
+
+
+def main():
+    total = 0
+    for part, patterns in PATTERNS.items():
+        paths = sorted(path for pattern in patterns for path in ROOT.glob(pattern))
+        if not paths:
+            sys.exit(f"count_wire_lines.py: no files for {part}")
+        print(part)
+        for path in paths:
+            lines = len(path.read_text(encoding="utf-8").splitlines())
+            total += lines
+            print(f"{lines:7}  {path.relative_to(ROOT)}")
+    print(f"{total:7}  in total")
+
+
+if __name__ == "__main__":
+    main()
