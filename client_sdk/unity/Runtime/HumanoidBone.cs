@@ -1,3 +1,5 @@
+using System.Collections.Generic;
+
 namespace Stridewire
 {
     /// <summary>A bone of a humanoid rig and the joint that turns it. The names of the joints are
@@ -5,30 +7,7 @@ namespace Stridewire
     public sealed class HumanoidBone
     {
         /// <summary>The bones of a rig. A bone follows its parent.</summary>
-        public static readonly HumanoidBone[] All =
-        {
-            new HumanoidBone("Hips", "Hips"),
-            new HumanoidBone("LeftUpperLeg", "LeftUpLeg", "LeftLowerLeg", "LeftLeg"),
-            new HumanoidBone("LeftLowerLeg", "LeftLeg", "LeftFoot", "LeftFoot"),
-            new HumanoidBone("LeftFoot", "LeftFoot"),
-            new HumanoidBone("LeftToes", "LeftToeBase"),
-            new HumanoidBone("RightUpperLeg", "RightUpLeg", "RightLowerLeg", "RightLeg"),
-            new HumanoidBone("RightLowerLeg", "RightLeg", "RightFoot", "RightFoot"),
-            new HumanoidBone("RightFoot", "RightFoot"),
-            new HumanoidBone("RightToes", "RightToeBase"),
-            new HumanoidBone("Spine", "Spine"),
-            new HumanoidBone("Chest", "Spine1"),
-            new HumanoidBone("LeftShoulder", "LeftShoulder"),
-            new HumanoidBone("LeftUpperArm", "LeftArm", "LeftLowerArm", "LeftForeArm"),
-            new HumanoidBone("LeftLowerArm", "LeftForeArm", "LeftHand", "LeftHand"),
-            new HumanoidBone("LeftHand", "LeftHand"),
-            new HumanoidBone("RightShoulder", "RightShoulder"),
-            new HumanoidBone("RightUpperArm", "RightArm", "RightLowerArm", "RightForeArm"),
-            new HumanoidBone("RightLowerArm", "RightForeArm", "RightHand", "RightHand"),
-            new HumanoidBone("RightHand", "RightHand"),
-            new HumanoidBone("Neck", "Neck"),
-            new HumanoidBone("Head", "Head"),
-        };
+        public static readonly HumanoidBone[] All = MakeAll();
 
         private HumanoidBone(string bone, string joint, string endBone = null,
                              string endJoint = null)
@@ -49,5 +28,33 @@ namespace Stridewire
         public string EndBone { get; private set; }
 
         public string EndJoint { get; private set; }
+
+        private static HumanoidBone[] MakeAll()
+        {
+            var bones = new List<HumanoidBone> { new HumanoidBone("Hips", "Hips") };
+            foreach (string side in new[] { "Left", "Right" })
+            {
+                bones.Add(new HumanoidBone(side + "UpperLeg", side + "UpLeg", side + "LowerLeg",
+                                           side + "Leg"));
+                bones.Add(new HumanoidBone(side + "LowerLeg", side + "Leg", side + "Foot",
+                                           side + "Foot"));
+                bones.Add(new HumanoidBone(side + "Foot", side + "Foot"));
+                bones.Add(new HumanoidBone(side + "Toes", side + "ToeBase"));
+            }
+            bones.Add(new HumanoidBone("Spine", "Spine"));
+            bones.Add(new HumanoidBone("Chest", "Spine1"));
+            foreach (string side in new[] { "Left", "Right" })
+            {
+                bones.Add(new HumanoidBone(side + "Shoulder", side + "Shoulder"));
+                bones.Add(new HumanoidBone(side + "UpperArm", side + "Arm", side + "LowerArm",
+                                           side + "ForeArm"));
+                bones.Add(new HumanoidBone(side + "LowerArm", side + "ForeArm", side + "Hand",
+                                           side + "Hand"));
+                bones.Add(new HumanoidBone(side + "Hand", side + "Hand"));
+            }
+            bones.Add(new HumanoidBone("Neck", "Neck"));
+            bones.Add(new HumanoidBone("Head", "Head"));
+            return bones.ToArray();
+        }
     }
 }
