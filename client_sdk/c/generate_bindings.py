@@ -178,8 +178,12 @@ def csharp_struct(api, name, fields):
 def csharp_function(api, name, result, arguments):
     lines = ["        [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]",
              f"        public static extern {csharp_type(api, result)} {name}("]
-    lines += [f"            {csharp_type(api, c_type.strip())} {argument}," for c_type, argument
-              in arguments]
+    for c_type, argument in arguments:
+        kind = csharp_type(api, c_type.strip())
+        # A handle keeps the client alive while the call runs. It is freed by its own destroy call.
+        if kind == "IntPtr" and pointers(c_type)[0] in api.opaque and not name.endswith("destroy"):
+            kind = "ClientHandle"
+        lines.append(f"            {kind} {argument},")
     lines[-1] = lines[-1].removesuffix(",") + ");"
     return [*lines, ""]
 

@@ -593,33 +593,33 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_connect(
-            IntPtr client,
+            ClientHandle client,
             byte* host,
             ushort port);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_connect_any(
-            IntPtr client,
+            ClientHandle client,
             stridewire_address* addresses,
             UIntPtr count);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_disconnect(
-            IntPtr client);
+            ClientHandle client);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern ClientState stridewire_client_get_state(
-            IntPtr client);
+            ClientHandle client);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_last_error(
-            IntPtr client,
+            ClientHandle client,
             byte* text,
             UIntPtr text_bytes);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_join_world(
-            IntPtr client,
+            ClientHandle client,
             byte* name,
             Role role,
             uint* world,
@@ -627,13 +627,13 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_leave_world(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             ulong* command);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_spawn(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_spawn* spawns,
             UIntPtr count,
@@ -641,7 +641,7 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_teleport(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_spawn* places,
             UIntPtr count,
@@ -649,7 +649,7 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_remove(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             uint* avatars,
             UIntPtr count,
@@ -657,7 +657,7 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_request(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_movement* movements,
             UIntPtr count,
@@ -665,7 +665,7 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_cancel(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             uint* avatars,
             UIntPtr count,
@@ -673,14 +673,14 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_set_terrain(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_terrain_def* terrain,
             ulong* command);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_set_layers(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_layer* layers,
             UIntPtr count,
@@ -688,14 +688,14 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_set_planting(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_planting* planting,
             ulong* command);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_observe(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_observation* observation,
             uint* subscription,
@@ -703,43 +703,43 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_move_region(
-            IntPtr client,
+            ClientHandle client,
             uint subscription,
             stridewire_region* region,
             ulong* command);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_stop_observing(
-            IntPtr client,
+            ClientHandle client,
             uint subscription,
             ulong* command);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_ping(
-            IntPtr client);
+            ClientHandle client);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_poll_events(
-            IntPtr client,
+            ClientHandle client,
             stridewire_event* events,
             UIntPtr capacity,
             UIntPtr* count);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_wait_event(
-            IntPtr client,
+            ClientHandle client,
             double timeout_s);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_get_skeleton(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_skeleton* skeleton,
             stridewire_skeleton_buffers* buffers);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_list_layers(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_layer_name* names,
             UIntPtr capacity,
@@ -747,14 +747,14 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_get_terrain(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             stridewire_terrain* terrain,
             stridewire_terrain_buffers* buffers);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_list_avatars(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             uint* avatars,
             UIntPtr capacity,
@@ -762,22 +762,22 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_server_time(
-            IntPtr client,
+            ClientHandle client,
             double* time_s);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_render_time(
-            IntPtr client,
+            ClientHandle client,
             double* time_s);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_get_playout(
-            IntPtr client,
+            ClientHandle client,
             stridewire_playout* playout);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_sample_pose(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             uint avatar,
             double time_s,
@@ -785,14 +785,14 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_latest_pose(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             uint avatar,
             stridewire_pose* pose);
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_next_pose(
-            IntPtr client,
+            ClientHandle client,
             uint world,
             uint avatar,
             ulong after_tick,
@@ -800,7 +800,7 @@ namespace Stridewire
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern Status stridewire_client_get_statistics(
-            IntPtr client,
+            ClientHandle client,
             stridewire_statistics* statistics);
 
         /// <summary>Returns the name of a struct whose layout differs from that of the C compiler

@@ -60,7 +60,7 @@ namespace Stridewire
         private int polledCount;
         private int nextPolled;
         private ulong lastRequest;
-        private IntPtr handle;
+        private readonly ClientHandle handle;
 
         /// <summary>Creates a client that is not connected. Throws VersionMismatch if the native
         /// library does not have the API version of this package.</summary>
@@ -93,13 +93,8 @@ namespace Stridewire
                 native.library_folder = folder;
                 IntPtr created;
                 Check(Abi.stridewire_client_create(&native, &created));
-                handle = created;
+                handle = new ClientHandle(created);
             }
-        }
-
-        ~Client()
-        {
-            Destroy();
         }
 
         /// <summary>Version of the native library, for example "0.1.0".</summary>
@@ -110,7 +105,11 @@ namespace Stridewire
 
         public ClientState State
         {
-            get { return Abi.stridewire_client_get_state(handle); }
+            get
+            {
+                if (handle.IsClosed) return ClientState.Idle;
+                return Abi.stridewire_client_get_state(handle);
+            }
         }
 
         /// <summary>Describes the last failed call or connection. Empty: there was none.</summary>
@@ -126,21 +125,21 @@ namespace Stridewire
             }
         }
 
-        internal IntPtr Handle
+        internal ClientHandle Handle
         {
             get
             {
-                if (handle == IntPtr.Zero) throw new ObjectDisposedException("Client");
+                if (handle.IsClosed) throw new ObjectDisposedException("Client");
                 return handle;
             }
         }
 
-        /// <summary>Ends the session and frees the client, which can take up to 1 s. The server
-        /// removes the avatars that this client has spawned, except in persistent worlds.</summary>
+        /// <summary>Ends the session and frees the client, which can take up to 1 s. If another
+        /// thread waits for an event, the client is freed when the wait ends. The server removes
+        /// the avatars that this client has spawned, except in persistent worlds.</summary>
         public void Dispose()
         {
-            Destroy();
-            GC.SuppressFinalize(this);
+            handle.Dispose();
         }
 
         /// <summary>Starts to connect. EventType.Connected reports success.</summary>
@@ -298,12 +297,6 @@ namespace Stridewire
         internal ulong NextRequest()
         {
             return ++lastRequest;
-        }
-
-        private void Destroy()
-        {
-            Abi.stridewire_client_destroy(handle);
-            handle = IntPtr.Zero;
         }
     }
 }

@@ -27,6 +27,7 @@ static class ClientTest
             case "requests": Requests(); break;
             case "poses": Poses(); break;
             case "errors": Errors(); break;
+            case "lifetime": Lifetime(); break;
             case "sample": Sample(); break;
             default: return 2;
         }
@@ -318,6 +319,36 @@ static class ClientTest
             RequireEqual(failed.Status, Status.ConnectFailed, "no server");
             RequireEqual(client.State, ClientState.Connecting, "state");
         }
+    }
+
+    /// A call keeps the native client alive.
+    static void Lifetime()
+    {
+        Type abi = typeof(Client).Assembly.GetType("Stridewire.Abi");
+        int calls = 0;
+        foreach (MethodInfo method in abi.GetMethods())
+        {
+            foreach (ParameterInfo parameter in method.GetParameters())
+            {
+                if (parameter.Name != "client" || method.Name.EndsWith("create")) continue;
+                bool isDestroy = method.Name.EndsWith("destroy");
+                RequireEqual(typeof(SafeHandle).IsAssignableFrom(parameter.ParameterType),
+                             !isDestroy, method.Name);
+                ++calls;
+            }
+        }
+        Require(calls > 20, "functions of a client");
+
+        var client = new Client();
+        bool hasEvent = true;
+        var waiting = new System.Threading.Thread(() => hasEvent = client.WaitEvent(1.0));
+        waiting.Start();
+        System.Threading.Thread.Sleep(300);
+        client.Dispose();
+        RequireEqual(client.State, ClientState.Idle, "state of a disposed client");
+        waiting.Join();
+        Require(!hasEvent, "a wait ends after the client was disposed");
+        client.Dispose();
     }
 
     /// Runs the sample with a rig of bones in a T-pose.

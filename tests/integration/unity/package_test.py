@@ -73,7 +73,7 @@ class Package(unittest.TestCase):
         return set(re.findall(r"^typedef enum (\w+)", text, re.M))
 
     def test_live(self):
-        for group in ("requests", "poses", "errors", "sample"):
+        for group in ("requests", "poses", "errors", "lifetime", "sample"):
             with self.subTest(group):
                 self.assertIn("passed", self.run_program(self.program, group, self.port))
 
