@@ -91,13 +91,26 @@ void PoseRecording::DropOld() {
     if (oldest == streams_.end()) return;
     auto& [key, stream] = *oldest;
     const Tick& tick = stream.ticks.front();
-    if (tick.info.server_time_s >= last_time_s_ - length_s_ && bytes_ <= max_bytes_) return;
+    if (tick.info.server_time_s >= last_time_s_ - length_s_ && bytes() <= max_bytes_) return;
     Discard(stream, tick);
     bytes_ -= tick.bytes;
     stream.ticks.pop_front();
     // This also frees the decoded poses of the stream.
     if (stream.ticks.empty()) streams_.erase(oldest);
   }
+}
+
+std::size_t PoseRecording::DecodedBytes() const {
+  std::size_t bytes = 0;
+  for (const auto& [key, stream] : streams_) {
+    for (const auto& decoded : stream.decoded) {
+      const CrowdPose& poses = decoded->poses;
+      bytes += sizeof(Decoded) + poses.avatars.capacity() * sizeof(protocol::AvatarId) +
+               poses.flags.capacity() + poses.roots_m.capacity() * sizeof(Vec3) +
+               poses.rotations.capacity() * sizeof(Quat);
+    }
+  }
+  return bytes;
 }
 
 const PoseRecording::Decoded* PoseRecording::Decode(Stream& stream, const Tick& tick) {
@@ -244,6 +257,10 @@ void PoseRecording::SampleAll(double time_s, const std::function<bool(protocol::
   // because it is written last.
   std::ranges::sort(around_, {}, [](const Neighbours& n) { return n.start->source->info.tick; });
   for (const Neighbours& around : around_) Interpolate(around, time_s, out);
+  if (DecodedBytes() > max_bytes_ / 2) {
+    for (auto& [key, stream] : streams_) stream.decoded.clear();
+  }
+  DropOld();
 }
 
 }  // namespace stridewire::client

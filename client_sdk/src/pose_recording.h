@@ -27,8 +27,9 @@ class PoseRecording {
   /// Time after the last batch of its stream for which an avatar can be sampled, in seconds.
   static constexpr double kKeepS = 2.0;
 
-  /// A recording of `length_s` seconds that stores at most `max_bytes` of batches. Either may be 0,
-  /// which disables it.
+  /// A recording of `length_s` seconds. Batches and decoded ticks use at most `max_bytes`, of which
+  /// decoded ticks use at most half; a call of SampleAll may use more until it returns. Either may
+  /// be 0, which disables the recording.
   PoseRecording(double length_s, std::size_t max_bytes)
       : length_s_(length_s), max_bytes_(max_bytes) {}
 
@@ -46,7 +47,8 @@ class PoseRecording {
   /// Returns the server time of the oldest recorded pose; NaN if the recording is empty.
   [[nodiscard]] double first_time_s() const;
   [[nodiscard]] double last_time_s() const { return last_time_s_; }
-  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+  /// Returns the memory of batches and decoded ticks.
+  [[nodiscard]] std::size_t bytes() const { return bytes_ + DecodedBytes(); }
 
   /// Computes the poses at `time_s` of all avatars for which `wants` returns true. Outside the
   /// recorded time, `out` is empty. Like PoseHistory, it does not interpolate across
@@ -92,6 +94,7 @@ class PoseRecording {
   /// Number of decoded ticks per stream. Playing in either direction needs four.
   static constexpr std::size_t kMaxDecoded = 8;
 
+  [[nodiscard]] std::size_t DecodedBytes() const;
   const Decoded* Decode(Stream& stream, const Tick& tick);
   static void Discard(Stream& stream, const Tick& tick);
   [[nodiscard]] Neighbours FindNeighbours(Stream& stream, double time_s);
@@ -101,7 +104,7 @@ class PoseRecording {
   double length_s_;
   std::size_t max_bytes_;
   std::map<std::int32_t, Stream> streams_;
-  std::size_t bytes_ = 0;
+  std::size_t bytes_ = 0;  ///< Memory of all batches.
   double last_time_s_ = std::numeric_limits<double>::quiet_NaN();
   std::uint64_t use_count_ = 0;
   std::vector<Neighbours> around_;

@@ -104,6 +104,29 @@ TEST_F(PoseRecordingTest, IsBoundedInBytes) {
   EXPECT_TRUE(std::isnan(view_->recording().last_time_s()));
 }
 
+TEST_F(PoseRecordingTest, CountsAndLimitsDecodedTicks) {
+  constexpr std::size_t kAvatars = 50;
+  std::vector<test_world::AvatarAt> avatars(kAvatars);
+  for (std::size_t i = 0; i < kAvatars; ++i) avatars[i].avatar = static_cast<std::uint32_t>(i + 1);
+  constexpr std::size_t kDecodedBytes = kAvatars * test_world::kJoints * sizeof(Quat);
+  for (std::uint64_t tick = 1; tick <= 60; ++tick) Take(tick, avatars);
+  const std::size_t encoded_bytes = view_->recording().bytes();
+  ASSERT_EQ(Recorded(30.5 / 60.0).avatars.size(), kAvatars);
+  EXPECT_GE(view_->recording().bytes(), encoded_bytes + 4 * kDecodedBytes);
+
+  // There is not enough memory for the decoded ticks that interpolation needs.
+  constexpr std::size_t kLimitBytes = 6 * kDecodedBytes;
+  Use(20.0, kLimitBytes);
+  for (std::uint64_t tick = 1; tick <= 60; ++tick) {
+    Take(tick, avatars);
+    ASSERT_LE(view_->recording().bytes(), kLimitBytes);
+    if (tick < 4) continue;
+    const double time_s = view_->recording().last_time_s() - 0.5 / 60.0;
+    ASSERT_EQ(Recorded(time_s).avatars.size(), kAvatars) << tick;
+    ASSERT_LE(view_->recording().bytes(), kLimitBytes);
+  }
+}
+
 TEST_F(PoseRecordingTest, CanBeDisabled) {
   Use(0.0, 4096);
   Take(1, {{1}});
