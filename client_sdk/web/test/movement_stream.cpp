@@ -89,8 +89,8 @@ class Stream {
   void SendTick(const protocol::Movements& movements, stridewire_world world) {
     const std::vector<std::byte> frame = Encode(movements);
     CrowdPose crowd;
-    std::uint64_t held = 0;
-    session_.FindWorld(world)->SampleAll(movements.server_time_s, crowd, held);
+    DisplayCounts displayed;
+    session_.FindWorld(world)->SampleAll(movements.server_time_s, crowd, displayed);
     poses_ += crowd.avatars.size();
     Write(frame, HashOf(crowd), movements.server_time_s);
   }
