@@ -134,7 +134,8 @@ test('records evaluated poses', {skip}, async () => {
     assert.ok(lastTimeS - firstTimeS > 0.5);
     const [live, recorded] = [createCrowdPose(), createCrowdPose()];
     let compared = 0;
-    for (let timeS = firstTimeS + 0.1; timeS < lastTimeS; timeS += 0.013) {
+    // Poses of one shard may end before those of the other. Only live poses are then extrapolated.
+    for (let timeS = firstTimeS + 0.1; timeS < lastTimeS - 0.1; timeS += 0.013) {
       assert.equal(world.sampleAll(timeS, live), 3);
       assert.equal(world.recording.sampleAll(timeS, recorded), 3);
       assert.deepEqual(recorded.flags.subarray(0, 3), live.flags.subarray(0, 3));
