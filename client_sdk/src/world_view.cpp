@@ -59,8 +59,13 @@ WorldView::Tracks::iterator WorldView::Erase(Tracks::iterator track) {
   const std::size_t bytes = PoseHistory::Bytes(pose_history_, track->second.history->joint_count());
   STRIDEWIRE_CHECK(budget_.used_bytes >= bytes);
   budget_.used_bytes -= bytes;
-  if (!track->second.gone) ++revision_;
-  return tracks_.erase(track);
+  if (track->second.gone) {
+    --gone_count_;
+  } else {
+    ++revision_;
+  }
+  next_track_ = tracks_.erase(track);
+  return next_track_;
 }
 
 Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks,
@@ -121,7 +126,8 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
 }
 
 WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
-  auto track = tracks_.find(avatar);
+  auto track = next_track_;
+  if (track == tracks_.end() || track->first != avatar) track = tracks_.find(avatar);
   if (track == tracks_.end()) {
     const std::size_t joints = skeleton_.joints.size();
     const std::size_t bytes = PoseHistory::Bytes(pose_history_, joints);
@@ -132,6 +138,7 @@ WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
     track->second.history = std::make_unique<PoseHistory>(pose_history_, joints);
     ++revision_;
   }
+  next_track_ = std::next(track);
   return &track->second;
 }
 
@@ -163,49 +170,47 @@ void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const Pos
   }
   Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose, *replica_counts_);
   if (!recording_.enabled()) return;
-  evaluated_.avatars.push_back(avatar);
-  evaluated_.flags.push_back(
+  evaluated_.push_back(avatar);
+  evaluated_flags_.push_back(
       static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
                                 (stamp.standing ? protocol::kPoseStanding : 0)));
-  evaluated_.roots_m.push_back(pose.root_position_m);
-  evaluated_.rotations.insert(evaluated_.rotations.end(), pose.rotations.begin(),
-                              pose.rotations.end());
+  if (!fits_) return;
+  block_.Add(pose.root_position_m, pose.rotations);
+  if (block_.size() == protocol::CompactCodec::kBlock) {
+    EncodeBlock(*codecs_->Find(protocol::PoseMode::kCompact));
+  }
+}
+
+void WorldView::EncodeBlock(const protocol::CompactCodec& codec) {
+  const std::size_t bytes = codec.pose_bytes();
+  const std::size_t first = encoded_.size();
+  encoded_.resize(first + block_.size() * bytes);
+  codec.Encode(block_);
+  for (std::size_t i = 0; i < block_.size(); ++i) {
+    fits_ &= block_.fits(i);
+    block_.CopyBytes(i, std::span(encoded_).subspan(first + i * bytes, bytes));
+  }
+  block_.Clear();
 }
 
 void WorldView::RecordEvaluated(const protocol::Movements& movements) {
-  const std::size_t count = evaluated_.avatars.size();
-  if (count == 0) return;
+  if (evaluated_.empty()) return;
   const std::size_t joints = skeleton_.joints.size();
-  const auto rotations = [&](std::size_t i) {
-    return std::span<const Quat>(evaluated_.rotations).subspan(i * joints, joints);
-  };
   protocol::PoseMode mode = protocol::PoseMode::kCompact;
-  const protocol::CompactCodec* codec = codecs_ ? codecs_->Find(mode) : nullptr;
-  bool fits = codec != nullptr;
-  if (fits) {
-    const std::size_t bytes = codec->pose_bytes();
-    encoded_.resize(count * bytes);
-    for (std::size_t first = 0; first < count; first += protocol::CompactCodec::kBlock) {
-      const std::size_t size = std::min(protocol::CompactCodec::kBlock, count - first);
-      block_.Clear();
-      for (std::size_t i = 0; i < size; ++i) {
-        block_.Add(evaluated_.roots_m[first + i], rotations(first + i));
-      }
-      codec->Encode(block_);
-      for (std::size_t i = 0; i < size; ++i) {
-        fits &= block_.fits(i);
-        block_.CopyBytes(i, std::span(encoded_).subspan((first + i) * bytes, bytes));
-      }
-    }
-  }
-  if (!fits) {
-    // A pose is outside the range of the compact codes.
+  if (fits_ && block_.size() > 0) EncodeBlock(*codecs_->Find(mode));
+  if (!fits_) {
+    // A pose is outside the range of the compact codes, or there are none.
     mode = protocol::PoseMode::kQuantised;
     const std::size_t bytes = protocol::PoseBytes(mode, joints);
-    encoded_.resize(count * bytes);
-    for (std::size_t i = 0; i < count; ++i) {
+    encoded_.resize(evaluated_.size() * bytes);
+    for (std::size_t i = 0; i < evaluated_.size(); ++i) {
+      const PoseHistory& history = *tracks_.at(evaluated_[i]).history;
+      const std::size_t newest = history.size() - 1;
       const auto out = std::span(encoded_).subspan(i * bytes, bytes);
-      if (!protocol::EncodePose(mode, evaluated_.roots_m[i], rotations(i), out)) return;
+      if (!protocol::EncodePose(mode, history.root_position_m(newest), history.rotations(newest),
+                                out)) {
+        return;
+      }
     }
   }
   recording_.Add({.info = {.world = movements.world,
@@ -215,8 +220,8 @@ void WorldView::RecordEvaluated(const protocol::Movements& movements) {
                            .server_time_s = movements.server_time_s,
                            .mode = mode,
                            .joint_count = static_cast<std::uint16_t>(joints)},
-                  .avatars = evaluated_.avatars,
-                  .flags = evaluated_.flags,
+                  .avatars = evaluated_,
+                  .flags = evaluated_flags_,
                   .poses = encoded_},
                  epoch_, codecs_);
 }
@@ -231,7 +236,11 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
   newest_time_s_ = std::max(newest_time_s_, movements.server_time_s);
   replica_every_n_ticks_ = std::max<std::uint64_t>(every_n_ticks, 1);
   replica_counts_ = &counts;
-  evaluated_.Resize(0, skeleton_.joints.size());
+  evaluated_.clear();
+  evaluated_flags_.clear();
+  encoded_.clear();
+  block_.Clear();
+  fits_ = codecs_ != nullptr && codecs_->Find(protocol::PoseMode::kCompact) != nullptr;
   const Status status = replicas.Apply(movements, *this);
   RecordEvaluated(movements);
   EraseGone(movements.server_time_s);
@@ -239,6 +248,7 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
 }
 
 void WorldView::EraseGone(double time_s) {
+  if (gone_count_ == 0) return;
   for (auto track = tracks_.begin(); track != tracks_.end();) {
     const Track& t = track->second;
     const bool forget = t.gone && t.history->size() > 0 &&
@@ -271,6 +281,11 @@ void WorldView::Remove(protocol::AvatarId avatar) {
 void WorldView::SetGone(Track& track, bool gone) {
   if (track.gone == gone) return;
   track.gone = gone;
+  if (gone) {
+    ++gone_count_;
+  } else {
+    --gone_count_;
+  }
   ++revision_;
 }
 

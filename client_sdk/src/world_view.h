@@ -163,12 +163,14 @@ class WorldView : public PoseSink {
               ConstPoseSpan pose) override;
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
-  /// Finds or creates the track of an avatar. Returns null if there is no memory for it.
+  /// Finds or creates the track of an avatar. Returns null if there is no memory for it. Fast if
+  /// the avatar follows that of the last call.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
 
-  /// Records the poses in `evaluated_`, which a message with movements has produced.
+  /// Records the poses of the avatars in `evaluated_`, which a message with movements has produced.
   void RecordEvaluated(const protocol::Movements& movements);
+  void EncodeBlock(const protocol::CompactCodec& codec);
 
   /// Must be called after the last part of a batch. Marks avatars of its shard and mode that were
   /// not in it as gone.
@@ -187,6 +189,8 @@ class WorldView : public PoseSink {
   std::shared_ptr<const protocol::CompactCodecs> codecs_;  ///< Codecs of compact poses, or null.
   std::optional<std::set<protocol::AvatarId>> filter_;
   Tracks tracks_;
+  Tracks::iterator next_track_ = tracks_.end();  // After the track that was found last.
+  std::size_t gone_count_ = 0;                   // Number of tracks that are gone.
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;
@@ -200,9 +204,12 @@ class WorldView : public PoseSink {
   std::uint64_t replica_every_n_ticks_ = 1;
   Counts* replica_counts_ = nullptr;  // Counters to update. Set while Apply(Movements) runs.
   // The poses of one message for the recording, in the order of evaluation, and their encoding.
-  CrowdPose evaluated_;
-  protocol::CompactCodec::Block block_;
+  // The last poses are in `block_` and not encoded yet.
+  std::vector<protocol::AvatarId> evaluated_;
+  std::vector<std::uint8_t> evaluated_flags_;
   std::vector<std::byte> encoded_;
+  protocol::CompactCodec::Block block_;
+  bool fits_ = true;                 // False if a pose is outside the range of the compact codes.
   std::uint16_t recorded_part_ = 0;  // Distinguishes messages of the same tick in the recording.
 };
 

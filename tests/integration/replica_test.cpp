@@ -97,7 +97,7 @@ struct Figures {
   std::size_t poses = 0;
 };
 
-void Advance(AvatarReplica& replica, SoaPoseEvaluator& evaluator, double dt_s) {
+void Advance(AvatarReplica& replica, ReplicaEvaluator& evaluator, double dt_s) {
   AvatarReplica* one = &replica;
   AvatarReplica::AdvanceAll(std::span(&one, 1), dt_s, evaluator);
 }
@@ -122,7 +122,7 @@ TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261123;
   Random random(kSeed);
-  SoaPoseEvaluator evaluator(*library_, 1);
+  ReplicaEvaluator evaluator(*library_);
   Figures figures;
   constexpr int kTicks = 3000;
   for (int round = 0; figures.movements < manner.movements / kFewer; ++round) {
@@ -249,7 +249,7 @@ TEST_P(ReplicaLibraries, HasTheSameBytesOnEveryInstructionSet) {
       std::vector<AvatarReplica> replicas(kAvatars, AvatarReplica(library_));
       std::vector<AvatarReplica*> all;
       for (AvatarReplica& replica : replicas) all.push_back(&replica);
-      SoaPoseEvaluator evaluator(*library_, 1);
+      ReplicaEvaluator evaluator(*library_);
       for (std::size_t t = 0; t < ticks.size(); ++t) {
         for (std::size_t i = 0; i < kAvatars; ++i) {
           const Bytes& record = ticks[t].records[i];
@@ -281,7 +281,7 @@ TEST(AvatarReplica, AllocatesOnlyInItsConstructor) {
   const Library library = LibraryOf({});
   RandomlyDriven driven(library, random);
   AvatarReplica replica(library);
-  SoaPoseEvaluator evaluator(*library, 1);
+  ReplicaEvaluator evaluator(*library);
   FootPlanScratch scratch(*library);
   Bytes record;
   for (int tick = 0; tick < 3000; ++tick) {
@@ -303,7 +303,7 @@ TEST(AvatarReplica, SurvivesDamagedRecords) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
   const Library library = LibraryOf({});
-  SoaPoseEvaluator evaluator(*library, 1);
+  ReplicaEvaluator evaluator(*library);
   FootPlanScratch scratch(*library);
   const auto below = [&](std::size_t n) {
     return static_cast<std::size_t>(random.Draw(0.0, static_cast<double>(n)));
@@ -359,7 +359,7 @@ TEST(AvatarReplica, IsUnknownBeforeAState) {
   Bytes change;
   ASSERT_TRUE(AppendChange(avatar, change));
   AvatarReplica replica(library);
-  SoaPoseEvaluator evaluator(*library, 1);
+  ReplicaEvaluator evaluator(*library);
   FootPlanScratch scratch(*library);
   EXPECT_FALSE(replica.is_known());
   EXPECT_EQ(replica.Apply(change, scratch).error().code, ErrorCode::kNotFound);

@@ -1,5 +1,6 @@
 #include "replica_set.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "base/check.h"
@@ -11,7 +12,7 @@ ReplicaSet::ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick
     : library_(std::move(library)),
       tick_s_(tick_s),
       max_avatars_(max_avatars),
-      evaluator_(*library_, 1),
+      evaluator_(*library_),
       plan_scratch_(*library_) {
   STRIDEWIRE_CHECK(tick_s > 0.0);
 }
@@ -75,13 +76,16 @@ Status ReplicaSet::Apply(const protocol::Movements& message, PoseSink& sink) {
   }
   CheckAvatarCount();
   if (message.states) {
-    for (const protocol::AvatarId id : message.avatars) {
-      const auto found = shard.avatars.find(id);
-      if (found == shard.avatars.end()) continue;
-      AvatarReplica* replica = found->second.replica.get();
-      AvatarReplica::AdvanceAll(std::span(&replica, 1), tick_s_, evaluator_);
-      EmitPose(message, id, found->second, sink);
+    due_.assign(message.avatars.begin(), message.avatars.end());
+    std::ranges::sort(due_);
+    due_.erase(std::ranges::unique(due_).begin(), due_.end());
+    std::erase_if(due_, [&](protocol::AvatarId id) { return !shard.avatars.contains(id); });
+    scratch_.clear();
+    for (const protocol::AvatarId id : due_) {
+      scratch_.push_back(shard.avatars.at(id).replica.get());
     }
+    AvatarReplica::AdvanceAll(scratch_, tick_s_, evaluator_);
+    for (const protocol::AvatarId id : due_) EmitPose(message, id, shard.avatars.at(id), sink);
     return {};
   }
   if (++shard.parts_applied < message.parts) return {};

@@ -42,7 +42,7 @@ class ReplicaSet {
   /// Largest number of shards. A message of any further shard is an error.
   static constexpr std::size_t kMaxShards = 1024;
 
-  /// Evaluates at most `max_avatars` avatars and ignores further ones. Each takes about 10 KB.
+  /// Evaluates at most `max_avatars` avatars and ignores further ones. Each takes about 13 KB.
   ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s, std::size_t max_avatars);
 
   /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded for
@@ -80,7 +80,8 @@ class ReplicaSet {
   std::size_t avatar_count_ = 0;  // Number of avatars of all shards.
   std::map<std::uint16_t, Shard> shards_;
   std::vector<AvatarReplica*> scratch_;
-  SoaPoseEvaluator evaluator_;
+  std::vector<protocol::AvatarId> due_;  // Avatars of the message whose states it contains.
+  ReplicaEvaluator evaluator_;
   FootPlanScratch plan_scratch_;
 };
 

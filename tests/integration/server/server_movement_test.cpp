@@ -30,7 +30,7 @@ using PoseMap = std::map<std::pair<std::uint64_t, AvatarId>, PoseBytes>;  // by 
 class MovementReader {
  public:
   explicit MovementReader(std::shared_ptr<const MotionLibrary> library)
-      : library_(std::move(library)), evaluator_(*library_, 1), plan_scratch_(*library_) {}
+      : library_(std::move(library)), evaluator_(*library_), plan_scratch_(*library_) {}
 
   Status Apply(const protocol::Movements& message) {
     Shard& shard = shards_[message.shard];
@@ -99,7 +99,7 @@ class MovementReader {
   }
 
   std::shared_ptr<const MotionLibrary> library_;
-  SoaPoseEvaluator evaluator_;
+  ReplicaEvaluator evaluator_;
   FootPlanScratch plan_scratch_;
   std::map<std::uint16_t, Shard> shards_;
 };

@@ -158,8 +158,13 @@ void SetTimes(MovementKind kind, Movement& movement) {
 
 }  // namespace
 
+ReplicaEvaluator::ReplicaEvaluator(const MotionLibrary& library)
+    : evaluator_(library, static_cast<int>(AvatarReplica::kTicksAhead)) {
+  batcher_.Reserve(kBatch);
+}
+
 AvatarReplica::AvatarReplica(std::shared_ptr<const MotionLibrary> library)
-    : body_(std::move(library)) {
+    : body_(std::move(library)), ahead_rotations_(kTicksAhead * body_.pose.rotations.size()) {
   body_.layered_pose = body_.pose;
   body_.layers.Reserve();
 }
@@ -172,6 +177,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& 
   STRIDEWIRE_CHECK(&scratch.library() == &library());
   Reader reader(record);
   const unsigned flags = reader.Flags();
+  if ((flags & (record::kIsState | record::kLeft | record::kMoves)) != 0) ahead_count_ = 0;
   if ((flags & record::kIsState) != 0) {
     ReadState(flags, reader);
   } else if (!is_known_) {
@@ -317,28 +323,54 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
 }
 
 void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
-                               SoaPoseEvaluator& evaluator) {
-  // Number of replicas that are evaluated together, as in AvatarSimulation::AdvanceAll.
-  constexpr std::size_t kAtOnce = 16;
-  std::array<PoseJob, kAtOnce> jobs;
-  while (!replicas.empty()) {
-    const auto block = replicas.first(std::min(replicas.size(), kAtOnce));
-    const MotionLibrary& library = block.front()->library();
-    std::size_t moving = 0;
-    for (AvatarReplica* replica : block) {
-      STRIDEWIRE_CHECK(&replica->library() == &library);
-      if (!replica->is_known_ || !replica->is_moving_) continue;
-      if (!replica->is_time_set_) replica->movement_time_s_ += dt_s;
-      jobs[moving++] = {&replica->body_.movement, replica->movement_time_s_, &replica->body_.pose};
+                               ReplicaEvaluator& evaluator) {
+  ++evaluator.tick_;
+  for (std::size_t begin = 0; begin < replicas.size(); begin += ReplicaEvaluator::kBatch) {
+    const auto batch =
+        replicas.subspan(begin, std::min(replicas.size() - begin, ReplicaEvaluator::kBatch));
+    const MotionLibrary& library = batch.front()->library();
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      AvatarReplica& replica = *batch[i];
+      STRIDEWIRE_CHECK(&replica.library() == &library);
+      if (!replica.is_known_ || !replica.is_moving_) continue;
+      if (!replica.is_time_set_) replica.movement_time_s_ += dt_s;
+      if (replica.ahead_index_ < replica.ahead_count_) continue;
+      const Movement& movement = replica.body_.movement;
+      // Replicas next to each other end their runs in the same tick and are then evaluated side by
+      // side, but different ones in each tick.
+      const std::size_t phase = (evaluator.tick_ + i / SoaPose::kLanes) % kTicksAhead;
+      const int count = SampleRunCount(movement, replica.movement_time_s_, dt_s, 1,
+                                       static_cast<int>(kTicksAhead - phase));
+      evaluator.batcher_.Add({&movement, replica.movement_time_s_, dt_s}, count,
+                             static_cast<std::uint32_t>(i));
+      replica.ahead_count_ = static_cast<std::size_t>(count);
+      replica.ahead_index_ = 0;
     }
-    EvaluatePoses(evaluator, std::span(jobs).first(moving));
-    for (AvatarReplica* replica : block) {
+    evaluator.batcher_.Evaluate(
+        evaluator.evaluator_,
+        [&](std::span<const EvaluationBatcher::Item> items, int pose, const SoaPose& poses) {
+          for (std::size_t lane = 0; lane < items.size(); ++lane) {
+            if (pose >= items[lane].count) continue;
+            AvatarReplica& replica = *batch[items[lane].tag];
+            const std::size_t joints = replica.body_.pose.rotations.size();
+            const auto at = static_cast<std::size_t>(pose);
+            poses.Get(lane, {replica.ahead_roots_m_[at],
+                             std::span(replica.ahead_rotations_).subspan(at * joints, joints)});
+          }
+        });
+    for (AvatarReplica* replica : batch) {
       if (!replica->is_known_) continue;
-      if (!replica->are_layers_set_) replica->body_.layers.Advance(library, dt_s);
-      replica->body_.ApplyLayers();
+      const std::size_t ahead = replica->is_moving_ ? replica->ahead_index_++ : 0;
+      AvatarBody& body = replica->body_;
+      if (!replica->are_layers_set_) body.layers.Advance(library, dt_s);
+      if (replica->is_moving_ && !body.layers.empty()) {
+        const ConstPoseSpan pose = replica->AheadPose(ahead);
+        body.pose.root_position_m = pose.root_position_m;
+        std::ranges::copy(pose.rotations, body.pose.rotations.begin());
+      }
+      body.ApplyLayers();
       replica->is_time_set_ = replica->are_layers_set_ = false;
     }
-    replicas = replicas.subspan(block.size());
   }
 }
 

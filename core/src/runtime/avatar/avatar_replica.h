@@ -1,15 +1,33 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "runtime/avatar/avatar_body.h"
-#include "runtime/pose/soa_pose_evaluator.h"
+#include "runtime/pose/evaluation_batcher.h"
 #include "stridewire/base/error.h"
 
 namespace stridewire {
+
+/// Memory for AvatarReplica::AdvanceAll. It may be shared by all replicas with the same library.
+/// Not thread-safe. Allocates only in its constructor.
+class ReplicaEvaluator {
+ public:
+  /// `library` must outlive the evaluator.
+  explicit ReplicaEvaluator(const MotionLibrary& library);
+
+ private:
+  friend class AvatarReplica;
+  /// Number of replicas whose movements are sorted together.
+  static constexpr std::size_t kBatch = 1024;
+
+  SoaPoseEvaluator evaluator_;
+  EvaluationBatcher batcher_;
+  std::size_t tick_ = 0;  // Number of calls of AdvanceAll.
+};
 
 /// A copy of an avatar that another program simulates. It receives movement records (see
 /// movement_record.h) and evaluates the same poses, bit for bit, in the same ticks. Not
@@ -32,15 +50,20 @@ class AvatarReplica {
   /// record. After an error the replica is unknown until the next state.
   [[nodiscard]] Status Apply(std::span<const std::byte> record, FootPlanScratch& scratch);
 
-  /// Advances replicas by one tick and evaluates their poses. All must have the same library.
-  /// Unknown replicas are skipped.
+  /// Advances replicas by one tick and evaluates their poses. All must have the same library. Each
+  /// may occur only once. Unknown replicas are skipped. A movement that does not change is
+  /// evaluated for several ticks at once, which reads the library less often. Pass the replicas in
+  /// the same order in each tick, because their positions decide in which ticks they are evaluated.
+  /// All calls need the same `dt_s`, unless the replica receives a state between them.
   static void AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
-                         SoaPoseEvaluator& evaluator);
+                         ReplicaEvaluator& evaluator);
 
   /// True if the replica has received a state and no error occurred since.
   [[nodiscard]] bool is_known() const { return is_known_; }
   /// The displayed pose in world space, after AdvanceAll. Undefined while the replica is unknown.
-  [[nodiscard]] ConstPoseSpan pose() const { return body_.DisplayedPose(); }
+  [[nodiscard]] ConstPoseSpan pose() const {
+    return is_moving_ && !body_.has_layers ? AheadPose(ahead_index_ - 1) : body_.DisplayedPose();
+  }
   /// AvatarSimulation::idle() of the avatar: it stands and has no queued requests.
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
@@ -49,8 +72,16 @@ class AvatarReplica {
 
  private:
   class Reader;
+  friend class ReplicaEvaluator;
+  /// Number of ticks of a movement that are evaluated at once.
+  static constexpr std::size_t kTicksAhead = 8;
+
   void ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch);
   void ReadState(unsigned flags, Reader& reader);
+  [[nodiscard]] ConstPoseSpan AheadPose(std::size_t i) const {
+    const std::size_t joints = body_.pose.rotations.size();
+    return {ahead_roots_m_[i], std::span(ahead_rotations_).subspan(i * joints, joints)};
+  }
 
   AvatarBody body_;
   double movement_time_s_ = 0.0;
@@ -61,6 +92,11 @@ class AvatarReplica {
   // advance it.
   bool is_time_set_ = false;
   bool are_layers_set_ = false;
+  // Poses of successive ticks of the movement, without layers.
+  std::array<Vec3, kTicksAhead> ahead_roots_m_ = {};
+  std::vector<Quat> ahead_rotations_;  // [kTicksAhead][joint]
+  std::size_t ahead_count_ = 0;
+  std::size_t ahead_index_ = 0;  // Pose of the next tick; the displayed pose is the one before.
 };
 
 }  // namespace stridewire

@@ -22,6 +22,13 @@ int SampleRunCount(const Movement& movement, double time_s, double step_s, int t
   return std::max(1, static_cast<int>(left) + 1);
 }
 
+void EvaluationBatcher::Reserve(std::size_t runs) {
+  items_.reserve(runs);
+  order_.reserve(runs);
+  entries_.reserve(runs);
+  sorted_.reserve(runs);
+}
+
 void EvaluationBatcher::Add(const SampleRun& run, int count, std::uint32_t tag) {
   STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount);
   STRIDEWIRE_CHECK(run.movement != nullptr && run.movement->group >= 0);

@@ -32,6 +32,9 @@ class EvaluationBatcher {
     int count = 1;          ///< Number of poses in the run.
   };
 
+  /// Reserves memory for this number of runs. Within it, no other function allocates.
+  void Reserve(std::size_t runs);
+
   /// Adds a run of `count` poses, 1 to kMaxCount. Its movement must stay alive until Evaluate
   /// returns.
   void Add(const SampleRun& run, int count, std::uint32_t tag);
