@@ -98,7 +98,12 @@ class PoseHistory {
   std::optional<Sampled> Display(double time_s, Vec3& root_position_m, std::span<Quat> rotations);
 
  private:
-  [[nodiscard]] std::size_t Slot(std::size_t i) const { return (first_ + i) % stamps_.size(); }
+  [[nodiscard]] std::size_t Slot(std::size_t i) const {
+    const std::size_t slot = first_ + i;
+    return slot < stamps_.size() ? slot : slot - stamps_.size();
+  }
+  /// Returns the index of the oldest pose after `time_s`, or size().
+  [[nodiscard]] std::size_t FirstAfterTime(double time_s) const;
 
   /// Sample without the correction.
   [[nodiscard]] std::optional<Sampled> SampleCurve(double time_s, Vec3& root_position_m,

@@ -31,7 +31,7 @@ std::shared_ptr<const protocol::CompactCodecs> WorldView::MakeCodecs(
 }
 
 void WorldView::ClearPoses() {
-  for (auto track = tracks_.begin(); track != tracks_.end();) track = Erase(track);
+  EraseTracks([](const Track&) { return true; });
   shards_.clear();
   left_.clear();
   newest_time_s_ = -std::numeric_limits<double>::infinity();
@@ -50,22 +50,23 @@ void WorldView::Clear() {
 void WorldView::SetFilter(std::optional<std::set<protocol::AvatarId>> filter) {
   filter_ = std::move(filter);
   if (!filter_) return;
-  for (auto track = tracks_.begin(); track != tracks_.end();) {
-    track = filter_->contains(track->first) ? std::next(track) : Erase(track);
-  }
+  EraseTracks([this](const Track& track) { return !filter_->contains(track.avatar); });
 }
 
-WorldView::Tracks::iterator WorldView::Erase(Tracks::iterator track) {
-  const std::size_t bytes = PoseHistory::Bytes(pose_history_, track->second.history->joint_count());
-  STRIDEWIRE_CHECK(budget_.used_bytes >= bytes);
-  budget_.used_bytes -= bytes;
-  if (track->second.gone) {
-    --gone_count_;
-  } else {
-    ++revision_;
-  }
-  next_track_ = tracks_.erase(track);
-  return next_track_;
+template <typename Predicate>
+void WorldView::EraseTracks(const Predicate& is_erased) {
+  std::erase_if(tracks_, [&](const Track& track) {
+    if (!is_erased(track)) return false;
+    const std::size_t bytes = PoseHistory::Bytes(pose_history_, track.history.joint_count());
+    STRIDEWIRE_CHECK(budget_.used_bytes >= bytes);
+    budget_.used_bytes -= bytes;
+    if (track.gone) {
+      --gone_count_;
+    } else {
+      ++revision_;
+    }
+    return true;
+  });
 }
 
 Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks,
@@ -125,29 +126,44 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
   return {};
 }
 
+std::vector<WorldView::Track>::iterator WorldView::LowerBound(protocol::AvatarId avatar) {
+  return std::ranges::lower_bound(tracks_, avatar, {}, &Track::avatar);
+}
+
+const WorldView::Track* WorldView::FindTrack(protocol::AvatarId avatar) const {
+  const auto track = std::ranges::lower_bound(tracks_, avatar, {}, &Track::avatar);
+  return track != tracks_.end() && track->avatar == avatar ? &*track : nullptr;
+}
+
 WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
-  auto track = next_track_;
-  if (track == tracks_.end() || track->first != avatar) track = tracks_.find(avatar);
-  if (track == tracks_.end()) {
-    const std::size_t joints = skeleton_.joints.size();
-    const std::size_t bytes = PoseHistory::Bytes(pose_history_, joints);
-    if (budget_.used_bytes + bytes > budget_.limit_bytes) return nullptr;
-    budget_.used_bytes += bytes;
-    STRIDEWIRE_CHECK(budget_.used_bytes <= budget_.limit_bytes);
-    track = tracks_.emplace(avatar, Track{}).first;
-    track->second.history = std::make_unique<PoseHistory>(pose_history_, joints);
-    ++revision_;
+  // The avatars of a message are in ascending order, with those of other shards between them.
+  constexpr std::size_t kMaxSteps = 8;
+  std::size_t index = next_track_;
+  const std::size_t end = std::min(index + kMaxSteps, tracks_.size());
+  while (index < end && tracks_[index].avatar < avatar) ++index;
+  if (index >= end || tracks_[index].avatar != avatar) {
+    auto track = LowerBound(avatar);
+    index = static_cast<std::size_t>(track - tracks_.begin());
+    if (track == tracks_.end() || track->avatar != avatar) {
+      const std::size_t joints = skeleton_.joints.size();
+      const std::size_t bytes = PoseHistory::Bytes(pose_history_, joints);
+      if (budget_.used_bytes + bytes > budget_.limit_bytes) return nullptr;
+      budget_.used_bytes += bytes;
+      STRIDEWIRE_CHECK(budget_.used_bytes <= budget_.limit_bytes);
+      tracks_.insert(track, Track{.avatar = avatar, .history = {pose_history_, joints}});
+      ++revision_;
+    }
   }
-  next_track_ = std::next(track);
-  return &track->second;
+  next_track_ = index + 1;
+  return &tracks_[index];
 }
 
 void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose,
                      Counts& counts) {
   stamp.discontinuity |= track.epoch != epoch_;
-  if (stamp.discontinuity || track.history->IsInterrupted()) track.segment = ++last_segment_;
+  if (stamp.discontinuity || track.history.IsInterrupted()) track.segment = ++last_segment_;
   stamp.segment = track.segment;
-  if (track.history->Push(stamp, pose.root_position_m, pose.rotations)) {
+  if (track.history.Push(stamp, pose.root_position_m, pose.rotations)) {
     ++counts.poses;
     track.epoch = epoch_;
     SetGone(track, false);
@@ -204,7 +220,7 @@ void WorldView::RecordEvaluated(const protocol::Movements& movements) {
     const std::size_t bytes = protocol::PoseBytes(mode, joints);
     encoded_.resize(evaluated_.size() * bytes);
     for (std::size_t i = 0; i < evaluated_.size(); ++i) {
-      const PoseHistory& history = *tracks_.at(evaluated_[i]).history;
+      const PoseHistory& history = FindTrack(evaluated_[i])->history;
       const std::size_t newest = history.size() - 1;
       const auto out = std::span(encoded_).subspan(i * bytes, bytes);
       if (!protocol::EncodePose(mode, history.root_position_m(newest), history.rotations(newest),
@@ -249,12 +265,10 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
 
 void WorldView::EraseGone(double time_s) {
   if (gone_count_ == 0) return;
-  for (auto track = tracks_.begin(); track != tracks_.end();) {
-    const Track& t = track->second;
-    const bool forget = t.gone && t.history->size() > 0 &&
-                        time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGoneS;
-    track = forget ? Erase(track) : std::next(track);
-  }
+  EraseTracks([time_s](const Track& t) {
+    return t.gone && t.history.size() > 0 &&
+           time_s - t.history.stamp(t.history.size() - 1).time_s > kKeepGoneS;
+  });
 }
 
 void WorldView::MarkMissingAsGone(const protocol::PoseBatchInfo& info) {
@@ -263,7 +277,7 @@ void WorldView::MarkMissingAsGone(const protocol::PoseBatchInfo& info) {
                   [&](const auto& item) { return item.second + kKeepLeftTicks < info.tick; });
     return EraseGone(info.server_time_s);
   }
-  for (auto& [avatar, t] : tracks_) {
+  for (Track& t : tracks_) {
     if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) SetGone(t, true);
   }
   EraseGone(info.server_time_s);
@@ -275,7 +289,8 @@ void WorldView::Leave(protocol::AvatarId avatar, std::uint64_t tick) {
 }
 
 void WorldView::Remove(protocol::AvatarId avatar) {
-  if (auto track = tracks_.find(avatar); track != tracks_.end()) SetGone(track->second, true);
+  const auto track = LowerBound(avatar);
+  if (track != tracks_.end() && track->avatar == avatar) SetGone(*track, true);
 }
 
 void WorldView::SetGone(Track& track, bool gone) {
@@ -293,8 +308,8 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
   const std::size_t joints = skeleton_.joints.size();
   out.Resize(tracks_.size(), joints);
   std::size_t count = 0;
-  for (auto& [avatar, track] : tracks_) {
-    PoseHistory& history = *track.history;
+  for (Track& track : tracks_) {
+    PoseHistory& history = track.history;
     if (history.size() == 0) continue;
     const bool is_after_newest = time_s > history.stamp(history.size() - 1).time_s;
     if (track.gone && is_after_newest) continue;
@@ -309,15 +324,15 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
     } else if (!sampled->interpolated) {
       flags |= kCrowdHeld;
     }
-    out.avatars[count] = avatar;
+    out.avatars[count] = track.avatar;
     out.flags[count++] = static_cast<std::uint8_t>(flags);
   }
   out.Resize(count, joints);
 }
 
 void WorldView::RenumberSegments() {
-  for (auto& [avatar, track] : tracks_) {
-    PoseHistory& history = *track.history;
+  for (Track& track : tracks_) {
+    PoseHistory& history = track.history;
     std::optional<std::uint32_t> old;
     for (std::size_t i = 0; i < history.size(); ++i) {
       const std::uint32_t segment = history.stamp(i).segment;
@@ -329,24 +344,24 @@ void WorldView::RenumberSegments() {
 }
 
 PoseHistory* WorldView::Find(protocol::AvatarId avatar) {
-  const auto track = tracks_.find(avatar);
-  return track == tracks_.end() ? nullptr : track->second.history.get();
+  const auto track = LowerBound(avatar);
+  return track != tracks_.end() && track->avatar == avatar ? &track->history : nullptr;
 }
 
 const PoseHistory* WorldView::Find(protocol::AvatarId avatar) const {
-  const auto track = tracks_.find(avatar);
-  return track == tracks_.end() ? nullptr : track->second.history.get();
+  const Track* track = FindTrack(avatar);
+  return track == nullptr ? nullptr : &track->history;
 }
 
 bool WorldView::IsGone(protocol::AvatarId avatar) const {
-  const auto track = tracks_.find(avatar);
-  return track == tracks_.end() || track->second.gone;
+  const Track* track = FindTrack(avatar);
+  return track == nullptr || track->gone;
 }
 
 std::vector<protocol::AvatarId> WorldView::Avatars() const {
   std::vector<protocol::AvatarId> avatars;
-  for (const auto& [avatar, track] : tracks_) {
-    if (!track.gone) avatars.push_back(avatar);
+  for (const Track& track : tracks_) {
+    if (!track.gone) avatars.push_back(track.avatar);
   }
   return avatars;
 }

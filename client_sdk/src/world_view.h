@@ -120,8 +120,8 @@ class WorldView : public PoseSink {
   /// avatars are included until their poses are erased.
   template <typename Call>
   void ForEach(const Call& call) const {
-    for (const auto& [avatar, track] : tracks_) {
-      if (track.history->size() > 0) call(avatar, *track.history, track.gone);
+    for (const Track& track : tracks_) {
+      if (track.history.size() > 0) call(track.avatar, track.history, track.gone);
     }
   }
 
@@ -142,7 +142,8 @@ class WorldView : public PoseSink {
 
  private:
   struct Track {
-    std::unique_ptr<PoseHistory> history;
+    protocol::AvatarId avatar = 0;
+    PoseHistory history;
     std::uint16_t shard = 0;
     protocol::PoseMode mode = protocol::PoseMode::kFull;
     std::uint64_t seen_tick = 0;
@@ -157,14 +158,16 @@ class WorldView : public PoseSink {
     protocol::PoseMode mode = protocol::PoseMode::kFull;
   };
   using Lane = std::pair<std::uint16_t, protocol::PoseMode>;  // shard, mode
-  using Tracks = std::map<protocol::AvatarId, Track>;
 
   void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
               ConstPoseSpan pose) override;
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
+  /// Returns the first track whose avatar is not below `avatar`.
+  [[nodiscard]] std::vector<Track>::iterator LowerBound(protocol::AvatarId avatar);
+  [[nodiscard]] const Track* FindTrack(protocol::AvatarId avatar) const;
   /// Finds or creates the track of an avatar. Returns null if there is no memory for it. Fast if
-  /// the avatar follows that of the last call.
+  /// the avatar follows that of the last call closely.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
 
@@ -177,7 +180,9 @@ class WorldView : public PoseSink {
   void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
   /// Erases avatars that have been gone for longer than kKeepGoneS.
   void EraseGone(double time_s);
-  Tracks::iterator Erase(Tracks::iterator track);
+  /// Erases the tracks for which `is_erased` returns true.
+  template <typename Predicate>
+  void EraseTracks(const Predicate& is_erased);
   void SetGone(Track& track, bool gone);
 
   std::size_t pose_history_;
@@ -188,9 +193,9 @@ class WorldView : public PoseSink {
   std::vector<std::string> layers_;
   std::shared_ptr<const protocol::CompactCodecs> codecs_;  ///< Codecs of compact poses, or null.
   std::optional<std::set<protocol::AvatarId>> filter_;
-  Tracks tracks_;
-  Tracks::iterator next_track_ = tracks_.end();  // After the track that was found last.
-  std::size_t gone_count_ = 0;                   // Number of tracks that are gone.
+  std::vector<Track> tracks_;   // In ascending order of the avatars.
+  std::size_t next_track_ = 0;  // Index after the track that was found last.
+  std::size_t gone_count_ = 0;  // Number of tracks that are gone.
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;

@@ -72,6 +72,8 @@ foreach(target core protocol client)
 endforeach()
 stridewire_wasm_object(replica_set ${PROJECT_SOURCE_DIR}/client_sdk/src/replica/replica_set.cpp)
 stridewire_wasm_object(client_module ${CMAKE_CURRENT_SOURCE_DIR}/wasm/client_module.cpp)
+stridewire_wasm_object(interpolate_kernel
+  ${PROJECT_SOURCE_DIR}/client_sdk/src/interpolate_kernel.cpp)
 stridewire_wasm_object(compact_kernel ${PROJECT_SOURCE_DIR}/protocol/src/compact_kernel.cpp)
 stridewire_wasm_object(quantise_kernel ${PROJECT_SOURCE_DIR}/protocol/src/quantise_kernel.cpp)
 stridewire_wasm_object(pose_kernels ${PROJECT_SOURCE_DIR}/core/src/runtime/pose/pose_kernels.cpp)

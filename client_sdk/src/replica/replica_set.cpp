@@ -22,7 +22,7 @@ void ReplicaSet::Synchronize(const protocol::Movements& message, Shard& shard, P
   const std::uint64_t previous_step = message.states ? message.step : message.step - 1;
   const std::uint16_t part = message.states ? 0 : message.part;
   if (shard.is_synchronized && previous_step == shard.step && part == shard.parts_applied) return;
-  for (const auto& [id, avatar] : shard.avatars) sink.OnGone(id);
+  for (const Avatar& avatar : shard.avatars) sink.OnGone(avatar.id);
   STRIDEWIRE_CHECK(avatar_count_ >= shard.avatars.size());
   avatar_count_ -= shard.avatars.size();
   shard = {.is_synchronized = true, .step = previous_step, .parts_applied = part, .avatars = {}};
@@ -31,32 +31,35 @@ void ReplicaSet::Synchronize(const protocol::Movements& message, Shard& shard, P
 Status ReplicaSet::ApplyRecord(const protocol::Movements& message, std::size_t i, Shard& shard,
                                PoseSink& sink) {
   const protocol::AvatarId id = message.avatars[i];
+  auto found = std::ranges::lower_bound(shard.avatars, id, {}, &Avatar::id);
+  const bool is_known = found != shard.avatars.end() && found->id == id;
   if ((message.flags[i] & protocol::kMovementGone) != 0) {
-    if (shard.avatars.erase(id) > 0) {
+    if (is_known && found->replica != nullptr) {
+      found->replica = nullptr;
       --avatar_count_;
       sink.OnGone(id);
     }
     return {};
   }
-  auto found = shard.avatars.find(id);
-  if (found == shard.avatars.end()) {
+  if (!is_known || found->replica == nullptr) {
     // A change is useless without the state that it changes. The server sends that state later.
     const bool is_state = AvatarReplica::IsState(message.record(i));
     if (!is_state || !sink.Wants(id) || avatar_count_ >= max_avatars_) return {};
-    found = shard.avatars.emplace(id, Avatar{std::make_unique<AvatarReplica>(library_)}).first;
+    if (!is_known) found = shard.avatars.insert(found, Avatar{.id = id});
+    found->replica = std::make_unique<AvatarReplica>(library_);
+    found->discontinuity = true;
     ++avatar_count_;
   }
-  if ((message.flags[i] & protocol::kPoseDiscontinuity) != 0) found->second.discontinuity = true;
-  return found->second.replica->Apply(message.record(i), plan_scratch_);
+  if ((message.flags[i] & protocol::kPoseDiscontinuity) != 0) found->discontinuity = true;
+  return found->replica->Apply(message.record(i), plan_scratch_);
 }
 
-void ReplicaSet::EmitPose(const protocol::Movements& message, protocol::AvatarId id, Avatar& avatar,
-                          PoseSink& sink) {
+void ReplicaSet::EmitPose(const protocol::Movements& message, Avatar& avatar, PoseSink& sink) {
   const PoseStamp stamp{.tick = message.tick,
                         .time_s = message.server_time_s,
                         .discontinuity = std::exchange(avatar.discontinuity, false),
                         .standing = avatar.replica->idle()};
-  sink.OnPose(id, message.shard, stamp, avatar.replica->pose());
+  sink.OnPose(avatar.id, message.shard, stamp, avatar.replica->pose());
 }
 
 void ReplicaSet::CheckAvatarCount() const {
@@ -71,31 +74,36 @@ Status ReplicaSet::Apply(const protocol::Movements& message, PoseSink& sink) {
   }
   Shard& shard = shards_[message.shard];
   Synchronize(message, shard, sink);
-  for (std::size_t i = 0; i < message.avatars.size(); ++i) {
-    if (Status status = ApplyRecord(message, i, shard, sink); !status) return status;
+  Status status;
+  for (std::size_t i = 0; i < message.avatars.size() && status; ++i) {
+    status = ApplyRecord(message, i, shard, sink);
   }
+  std::erase_if(shard.avatars, [](const Avatar& avatar) { return avatar.replica == nullptr; });
   CheckAvatarCount();
+  if (!status) return status;
+  const auto advance = [&](std::span<Avatar* const> avatars, bool emits) {
+    replicas_.clear();
+    for (const Avatar* avatar : avatars) replicas_.push_back(avatar->replica.get());
+    AvatarReplica::AdvanceAll(replicas_, tick_s_, evaluator_);
+    if (!emits) return;
+    for (Avatar* avatar : avatars) EmitPose(message, *avatar, sink);
+  };
+  due_.clear();
   if (message.states) {
-    due_.assign(message.avatars.begin(), message.avatars.end());
+    for (const protocol::AvatarId id : message.avatars) {
+      const auto found = std::ranges::lower_bound(shard.avatars, id, {}, &Avatar::id);
+      if (found != shard.avatars.end() && found->id == id) due_.push_back(&*found);
+    }
     std::ranges::sort(due_);
     due_.erase(std::ranges::unique(due_).begin(), due_.end());
-    std::erase_if(due_, [&](protocol::AvatarId id) { return !shard.avatars.contains(id); });
-    scratch_.clear();
-    for (const protocol::AvatarId id : due_) {
-      scratch_.push_back(shard.avatars.at(id).replica.get());
-    }
-    AvatarReplica::AdvanceAll(scratch_, tick_s_, evaluator_);
-    for (const protocol::AvatarId id : due_) EmitPose(message, id, shard.avatars.at(id), sink);
+    advance(due_, true);
     return {};
   }
   if (++shard.parts_applied < message.parts) return {};
   shard.parts_applied = 0;
   shard.step = message.step;
-  scratch_.clear();
-  for (auto& [id, avatar] : shard.avatars) scratch_.push_back(avatar.replica.get());
-  AvatarReplica::AdvanceAll(scratch_, tick_s_, evaluator_);
-  if (message.more_steps > 0) return {};
-  for (auto& [id, avatar] : shard.avatars) EmitPose(message, id, avatar, sink);
+  for (Avatar& avatar : shard.avatars) due_.push_back(&avatar);
+  advance(due_, message.more_steps == 0);
   return {};
 }
 

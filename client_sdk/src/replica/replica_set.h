@@ -56,7 +56,8 @@ class ReplicaSet {
 
  private:
   struct Avatar {
-    std::unique_ptr<AvatarReplica> replica;
+    protocol::AvatarId id = 0;
+    std::unique_ptr<AvatarReplica> replica;  // Null if the avatar is gone.
     // True if the next pose must not be interpolated from the previous one.
     bool discontinuity = true;
   };
@@ -64,14 +65,13 @@ class ReplicaSet {
     bool is_synchronized = false;
     std::uint64_t step = 0;           // Number of the last complete step.
     std::uint16_t parts_applied = 0;  // Number of parts of the next step that have been applied.
-    std::map<protocol::AvatarId, Avatar> avatars;
+    std::vector<Avatar> avatars;      // In ascending order of the ids.
   };
 
   void Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink);
   [[nodiscard]] Status ApplyRecord(const protocol::Movements& message, std::size_t i, Shard& shard,
                                    PoseSink& sink);
-  void EmitPose(const protocol::Movements& message, protocol::AvatarId id, Avatar& avatar,
-                PoseSink& sink);
+  static void EmitPose(const protocol::Movements& message, Avatar& avatar, PoseSink& sink);
   void CheckAvatarCount() const;
 
   std::shared_ptr<const MotionLibrary> library_;
@@ -79,8 +79,8 @@ class ReplicaSet {
   std::size_t max_avatars_;
   std::size_t avatar_count_ = 0;  // Number of avatars of all shards.
   std::map<std::uint16_t, Shard> shards_;
-  std::vector<AvatarReplica*> scratch_;
-  std::vector<protocol::AvatarId> due_;  // Avatars of the message whose states it contains.
+  std::vector<AvatarReplica*> replicas_;  // Scratch memory: their replicas.
+  std::vector<Avatar*> due_;              // Scratch memory: the avatars that advance.
   ReplicaEvaluator evaluator_;
   FootPlanScratch plan_scratch_;
 };

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace stridewire::client {
 namespace {
@@ -39,6 +40,59 @@ TEST(PoseHistory, ReturnsReceivedPosesExactly) {
     EXPECT_EQ(root_m, history.root_position_m(i));
     EXPECT_EQ(rotations[0], history.rotations(i)[0]);
     EXPECT_EQ(rotations[1], history.rotations(i)[1]);
+  }
+}
+
+// The same formula as the SIMD kernel, for one rotation.
+Quat InterpolateOne(const std::array<Quat, 4>& keys, bool is_before, float value, float start_slope,
+                    float end_slope) {
+  const auto near = [](const Quat& q, const Quat& reference) {
+    return Dot(q, reference) < 0.0f ? -q : q;
+  };
+  const Quat start = keys[1];
+  const Quat before = near(keys[0], start);
+  const Quat end = near(keys[2], start);
+  const Quat beyond = near(keys[3], end);
+  const Quat slope_end = is_before ? start : end;
+  return Normalise(start + (end - start) * value + (slope_end - before) * start_slope +
+                   (beyond - start) * end_slope);
+}
+
+TEST(PoseHistory, InterpolatesAnyNumberOfRotationsWithTheSameBits) {
+  constexpr unsigned kSeed = 7;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  std::mt19937 random(kSeed);
+  std::normal_distribution<float> normal;
+  for (std::size_t joints = 1; joints <= 35; ++joints) {
+    std::array<std::vector<Quat>, 4> keys;
+    for (auto& key : keys) {
+      for (std::size_t j = 0; j < joints; ++j) {
+        key.push_back(
+            Normalise(Quat(normal(random), normal(random), normal(random), normal(random))));
+      }
+    }
+    for (const bool is_before : {false, true}) {
+      const float u = 0.3f;
+      const float value = u * u * (3.0f - 2.0f * u);
+      // Keys at 0, 1, 2 and 3 s: the slope at the start is a secant of 2 s, or of 1 s.
+      const float start_slope = u * (1.0f - u) * (1.0f - u) * (is_before ? 1.0f : 0.5f);
+      const float end_slope = u * u * (u - 1.0f) * 0.5f;
+      const auto pose = [&](std::size_t k) { return ConstPoseSpan{Vec3(0.0f), keys[k]}; };
+      Vec3 root_m;
+      std::vector<Quat> rotations(joints);
+      InterpolatePose({.times_s = {0.0, 1.0, 2.0, 3.0},
+                       .before = pose(0),
+                       .start = pose(1),
+                       .end = pose(2),
+                       .beyond = pose(3),
+                       .start_slope_is_before = is_before},
+                      1.0 + static_cast<double>(u), root_m, rotations);
+      for (std::size_t j = 0; j < joints; ++j) {
+        const Quat expected = InterpolateOne({keys[0][j], keys[1][j], keys[2][j], keys[3][j]},
+                                             is_before, value, start_slope, end_slope);
+        EXPECT_EQ(rotations[j], expected) << joints << " joints, joint " << j;
+      }
+    }
   }
 }
 
