@@ -66,6 +66,7 @@ bool Session::HandleFrame(const protocol::FrameView& frame, double now_s) {
 }
 
 void Session::OnFrame(std::span<const std::byte> frame, double now_s) {
+  answered_command_ = 0;
   if (!Receives()) return;
   heard_s_ = now_s;
   bytes_received_ += frame.size();

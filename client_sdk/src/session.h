@@ -45,6 +45,9 @@ class Session : public SessionCommands {
   /// Same as OnBytes for transports that keep frames apart, such as WebSocket. `frame` must be one
   /// complete frame and begin on a multiple of 8 bytes.
   void OnFrame(std::span<const std::byte> frame, double now_s);
+  /// Returns the command of the application that the frame of the last OnFrame has answered; 0 if
+  /// it was no Reply, or a Reply to a command of the session itself.
+  [[nodiscard]] std::uint64_t answered_command() const { return answered_command_; }
   /// Must be called when the attempt to connect has failed or the connection was lost.
   void OnLost(stridewire_status status, std::string_view text, double now_s);
   /// Handles timeouts and sends pings.

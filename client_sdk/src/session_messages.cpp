@@ -207,6 +207,7 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
   if (found == unanswered_.end()) return;
   const Command command = std::move(found->second);
   unanswered_.erase(found);
+  answered_command_ = command.own ? 0 : command.id;
   // Replies may arrive in any order: the world is unknown if a later LeaveWorld was answered first.
   const auto entry = worlds_.find(command.world);
   World* world = entry == worlds_.end() ? nullptr : &entry->second;
@@ -269,6 +270,7 @@ void Session::OnJoinReply(World& world, const protocol::Reply& reply, double now
                           "the server sent no WorldInfo before its Reply", now_s);
   }
   const Command command{world.join_command, handle, world.join_answered, 0, {}};
+  answered_command_ = command.own ? 0 : command.id;
   world.join_answered = true;
   if (joined) {
     if (world.state == World::State::kJoining) world.state = World::State::kJoined;

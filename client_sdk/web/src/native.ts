@@ -17,7 +17,7 @@ interface Exports {
   state(client: number, nowS: number): number;
   start_connecting(client: number, nowS: number): void;
   on_connected(client: number, nowS: number): void;
-  on_frame(client: number, bytes: number, nowS: number): void;
+  on_frame(client: number, bytes: number, nowS: number): number;
   take_library_request(client: number): number;
   on_library(client: number, hashBytes: number, bytes: number): number;
   on_lost(client: number, status: number, bytes: number, nowS: number): void;

@@ -68,6 +68,8 @@ export class Session {
   private readonly inspections = new Map<bigint, Inspection>();
   private lastEventsNumber = 0n;
   private connection = 0;
+  /** The command that the last frame has answered, or 0. */
+  private answered = 0;
   private nowS = 0;
 
   private readonly notifications: (() => void)[] = [];
@@ -340,7 +342,7 @@ export class Session {
     const startedMs = hasPoses ? this.precisionNowMs() : 0;
     this.run(() => {
       native().setInput(new Uint8Array(frame));
-      native().call.on_frame(this.client, frame.byteLength, nowS);
+      this.answered = native().call.on_frame(this.client, frame.byteLength, nowS);
       if (hasPoses) this.decodeMs += this.precisionNowMs() - startedMs;
     }, frame);
   }
@@ -532,7 +534,6 @@ export class Session {
     let message: Message | null = null;
     const read = (): Message => message ??= readMessage(frame!);
     const type = frame === undefined ? 0 : typeOfFrame(frame);
-    let replied = false;
     let accepted = frame !== undefined;
     for (;;) {
       const event = native().call.next_event(this.client);
@@ -563,9 +564,9 @@ export class Session {
           this.detach();
           break;
         case eventTypes.reply: {
-          // Only the first reply belongs to the message. Replies after it concern other commands.
-          const reply = type === MessageType.Reply && !replied ? read() as ReplyMessage : undefined;
-          replied = true;
+          // Other replies follow from the message, but it does not describe them.
+          const reply = frame !== undefined && command === this.answered
+              ? read() as ReplyMessage : undefined;
           const pending = this.pending.get(command);
           this.pending.delete(command);
           const result = makeReply(status, reply?.text ?? webNames(text), reply);

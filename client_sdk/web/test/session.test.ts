@@ -327,6 +327,22 @@ test('fails the waiting commands of a refused world', async () => {
   assert.equal(h.session.joinWorld('nowhere', 'controller').state, 'joining');
 });
 
+test('only the command that a Reply answers gets its fields', async () => {
+  const h = new Harness();
+  const world = h.joined();
+  h.lose();
+  h.connect({resumed: false, token: 8});
+  const waiting = world.spawn([{positionM: [0, 0, 0], headingRad: 0}]);
+  assert.deepEqual(summary(h.sent()), ['JoinWorld 1']);
+  // The session itself has joined the world again, so the command that waits for it is the only one
+  // to be answered.
+  h.receive(server.reply(1n, 107, [{index: 0, avatar: 41}], 'no world of that name', 1));
+  const reply = await waiting;
+  assert.equal(reply.status, 'not_joined');
+  assert.equal(reply.accepted, 0);
+  assert.deepEqual(reply.items, []);
+});
+
 test('leaves a world and can join it again', async () => {
   const h = new Harness();
   const world = h.joined();

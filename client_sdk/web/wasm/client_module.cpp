@@ -342,8 +342,8 @@ STRIDEWIRE_EXPORT(start_connecting) void StartConnecting(Client* client, double 
 STRIDEWIRE_EXPORT(on_connected) void OnConnected(Client* client, double now_s) {
   client->session.OnConnected(now_s);
 }
-/// Handles the frame in `input`.
-STRIDEWIRE_EXPORT(on_frame) void OnFrame(Client* client, std::size_t bytes, double now_s) {
+/// Handles the frame in `input`. Returns the command that the frame answers, or 0.
+STRIDEWIRE_EXPORT(on_frame) double OnFrame(Client* client, std::size_t bytes, double now_s) {
   client->session.OnFrame(Input(bytes), now_s);
   RunLibraryTasks(*client);
 }
@@ -358,6 +358,7 @@ STRIDEWIRE_EXPORT(take_library_request) std::uint32_t TakeLibraryRequest(Client*
     SetText(client->libraries_to_load.back());
     client->loading_libraries.push_back(std::move(client->libraries_to_load.back()));
     client->libraries_to_load.pop_back();
+  return static_cast<double>(client->session.answered_command());
     return 1;
   }
   if (client->libraries_to_store.empty()) return 0;
