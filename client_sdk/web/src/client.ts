@@ -9,6 +9,8 @@ import type {Role, World} from './types';
 
 /** Longest timer interval. Browsers delay timers of hidden pages, so long ones are not reliable. */
 const maxTimerMs = 500;
+/** Largest number of addresses, as in the C API. */
+const maxAddresses = 16;
 /** While the socket has more unsent bytes than this, the session keeps its commands. */
 const maxBufferedBytes = 1 << 20;
 
@@ -17,7 +19,7 @@ const maxBufferedBytes = 1 << 20;
  *
  * After `connect` the client reconnects automatically until `close` is called or the server refuses
  * it. The first attempt after a failure follows within 0.1 s. The delay doubles up to 5 s, and each
- * delay is shortened at random by up to half.
+ * delay is shortened at random by up to half. With several addresses it tries them in order.
  *
  * While the connection is down, new commands wait. After a reconnect the server usually still has
  * the session. The client then sends commands without a reply again, and the server carries out
@@ -31,7 +33,7 @@ export class Client {
   private readonly session: Session;
   private readonly now: () => number;
   private readonly webSocket: new (url: string) => WebSocketLike;
-  private readonly url: string;
+  private readonly urls: readonly string[];
   private socket: WebSocketLike | null = null;
   /** `Session.connectionNumber` for which the socket was opened. */
   private socketNumber = 0;
@@ -43,7 +45,7 @@ export class Client {
    * Creates a client that is not connected yet.
    * @throws Error WebAssembly or its SIMD instructions are missing
    * @throws RangeError an option is out of range
-   * @throws SyntaxError `url` does not start with ws:// or wss://
+   * @throws SyntaxError a URL does not start with ws:// or wss://
    * @throws TypeError an option has the wrong type, there is no WebSocket class, or the machine is
    *     big-endian
    */
@@ -54,10 +56,15 @@ export class Client {
     const {url, webSocket, now, ...others} = options;
     const given = Object.fromEntries(
         Object.entries(others).filter(([, value]) => value !== undefined));
-    this.url = url;
-    const protocol = new URL(url).protocol;
-    if (protocol !== 'ws:' && protocol !== 'wss:') {
-      throw new SyntaxError(`url: expected ws://... or wss://..., got ${url}`);
+    this.urls = typeof url === 'string' ? [url] : [...url];
+    if (this.urls.length < 1 || this.urls.length > maxAddresses) {
+      throw new RangeError(`url: expected 1 to ${maxAddresses} addresses, got ${this.urls.length}`);
+    }
+    for (const each of this.urls) {
+      const {protocol} = new URL(each);
+      if (protocol !== 'ws:' && protocol !== 'wss:') {
+        throw new SyntaxError(`url: expected ws://... or wss://..., got ${each}`);
+      }
     }
     const socketClass = webSocket ?? globalThis.WebSocket;
     if (socketClass === undefined) {
@@ -115,7 +122,7 @@ export class Client {
 
   /** Starts to connect and returns at once. Does nothing if already connected or connecting. */
   connect(): void {
-    this.session.open(this.nowS());
+    this.session.open(this.nowS(), this.urls);
   }
 
   /**
@@ -179,7 +186,7 @@ export class Client {
     };
     let socket: WebSocketLike;
     try {
-      socket = new this.webSocket(this.url);
+      socket = new this.webSocket(this.urls[session.addressIndex]!);
     } catch (error) {
       const text = error instanceof Error ? error.message : '';
       queueMicrotask(() => session.onLost(Status.connect_failed, text, this.nowS()));

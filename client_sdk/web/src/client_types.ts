@@ -47,8 +47,10 @@ export interface LibraryCache {
 
 /** Options of a client. Only `url` is required. */
 export interface ClientOptions {
-  /** Address of the server: `ws://host:port/stream`, or the same with `wss`. */
-  url: string;
+  /** Address of the server: `ws://host:port/stream`, or the same with `wss`. Or 1 to 16 addresses
+   * of servers that offer the same worlds. The client tries them in order, and after a lost
+   * connection first the one it was connected to. A session continues only on the same server. */
+  url: string | readonly string[];
   /** Name of this client for the server's log, 1 to 64 bytes. Default `stridewire-web`. */
   clientName?: string;
   /** Token for servers that require one, at most 4096 bytes. Default empty. */

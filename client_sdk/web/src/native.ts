@@ -12,7 +12,7 @@ interface Exports {
   describe_status(status: number, name: number): void;
   create(nameBytes: number, tokenBytes: number): number;
   destroy(client: number): void;
-  open(client: number, nowS: number): void;
+  open(client: number, bytes: number, nowS: number): void;
   close(client: number, nowS: number): void;
   state(client: number, nowS: number): number;
   start_connecting(client: number, nowS: number): void;

@@ -117,12 +117,14 @@ export class Session {
     return native().call.render_time(this.client, nowS);
   }
 
-  /** Starts to connect. Does nothing if already open. */
-  open(nowS: number): void {
+  /** Starts to connect. Does nothing if already open. The network connects to one of the `urls`, by
+   * its index. */
+  open(nowS: number, urls: readonly string[] = ['']): void {
     if (this.isOpen()) return;
     this.lastErrorText = '';
     this.run(() => {
-      native().call.open(this.client, nowS);
+      const bytes = native().setInputText(urls.map((url) => `${url}\n`).join(''));
+      native().call.open(this.client, bytes, nowS);
       this.synchronise();
       for (const world of this.worlds) {
         if (world.state === 'pending') this.attach(world);
@@ -307,6 +309,12 @@ export class Session {
   get connectionNumber(): number {
     native().call.state(this.client, 0);
     return native().results[3]!;
+  }
+
+  /** Returns the index of the address for the attempt that `startConnecting` has begun. */
+  get addressIndex(): number {
+    native().call.state(this.client, 0);
+    return native().results[5]!;
   }
 
   /** Returns true if this state needs a socket. If not, the network closes it. */

@@ -320,6 +320,33 @@ test('spawns avatars again after a server was killed and restarted', {skip}, asy
   }
 });
 
+test('uses the next address if a server does not answer or shuts down', {skip}, async () => {
+  const gone = await ServerProcess.start();
+  await gone.kill();
+  const first = await ServerProcess.start();
+  const second = await ServerProcess.start();
+  const client = makeClient(first, {url: [gone.url, first.url, second.url]});
+  const errors: string[] = [];
+  client.on('error', (_code, text) => errors.push(text));
+  try {
+    client.connect();
+    const world = client.joinWorld('plaza');
+    assert.ok((await world.joined).ok);
+    assert.ok(errors[0]!.startsWith(`${gone.url}: `), errors[0]);
+    assert.equal(errors.length, 1);
+    // Servers that shut down tell their clients, which then move to the next address.
+    await first.kill('SIGTERM');
+    await until('the client has moved', () => client.state === 'ready' && errors.length === 2);
+    assert.ok(errors[1]!.startsWith(`${first.url}: `), errors[1]);
+    await until('the world is joined again', () => world.state === 'joined');
+    assert.ok((await world.spawn([{positionM: [0, 0, 0], headingRad: 0}])).ok);
+  } finally {
+    client.close();
+    await first.kill();
+    await second.kill();
+  }
+});
+
 test('terrain is sent to all clients, and avatars walk on it', {skip}, async () => {
   const server = await ServerProcess.start();
   const builder = makeClient(server);

@@ -318,14 +318,25 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
 
 STRIDEWIRE_EXPORT(destroy) void Destroy(Client* client) { delete client; }
 
-STRIDEWIRE_EXPORT(open) void Open(Client* client, double now_s) {
-  (void)client->session.Open(now_s);
+/// Starts to connect. `input` contains the addresses of the servers, each followed by a line feed.
+STRIDEWIRE_EXPORT(open) void Open(Client* client, std::size_t bytes, double now_s) {
+  std::vector<std::string> addresses;
+  std::string address;
+  for (const std::byte byte : Input(bytes)) {
+    const char character = static_cast<char>(byte);
+    if (character != '\n') {
+      address += character;
+    } else {
+      addresses.push_back(std::exchange(address, {}));
+    }
+  }
+  (void)client->session.Open(now_s, std::move(addresses));
 }
 STRIDEWIRE_EXPORT(close) void Close(Client* client, double now_s) { client->session.Close(now_s); }
 
 /// Returns the state, a Session::State. results: 0 the next time at which to call advance,
 /// 1 whether to start an attempt to connect, 2 whether the state needs a socket, 3 the number of
-/// the connection, 4 the number of bytes that wait to be sent.
+/// the connection, 4 the number of bytes that wait to be sent, 5 the index of the address.
 STRIDEWIRE_EXPORT(state) std::uint32_t State(Client* client, double now_s) {
   const Session& session = client->session;
   results[0] = session.NextTime();
@@ -333,6 +344,7 @@ STRIDEWIRE_EXPORT(state) std::uint32_t State(Client* client, double now_s) {
   results[2] = session.NeedsSocket();
   results[3] = static_cast<double>(session.connection_number());
   results[4] = static_cast<double>(session.output_bytes());
+  results[5] = static_cast<double>(session.address_index());
   return static_cast<std::uint32_t>(session.state());
 }
 
@@ -346,6 +358,7 @@ STRIDEWIRE_EXPORT(on_connected) void OnConnected(Client* client, double now_s) {
 STRIDEWIRE_EXPORT(on_frame) double OnFrame(Client* client, std::size_t bytes, double now_s) {
   client->session.OnFrame(Input(bytes), now_s);
   RunLibraryTasks(*client);
+  return static_cast<double>(client->session.answered_command());
 }
 
 /// Returns 1 if the library whose hash is in the text should be loaded from the cache. Then call
@@ -358,7 +371,6 @@ STRIDEWIRE_EXPORT(take_library_request) std::uint32_t TakeLibraryRequest(Client*
     SetText(client->libraries_to_load.back());
     client->loading_libraries.push_back(std::move(client->libraries_to_load.back()));
     client->libraries_to_load.pop_back();
-  return static_cast<double>(client->session.answered_command());
     return 1;
   }
   if (client->libraries_to_store.empty()) return 0;
