@@ -220,6 +220,7 @@ DVec3 StrideModel::MeasuredEndVelocity() const {
 
 void JoinStrides(std::array<StrideModel, 2>& strides) {
   constexpr double kShare = 0.5;
+  constexpr double kFadePart = 0.45;
   for (const Foot ahead : {Foot::kLeft, Foot::kRight}) {
     StrideModel& before = strides[static_cast<std::size_t>(ahead)];
     StrideModel& after = strides[static_cast<std::size_t>(OtherFoot(ahead))];
@@ -240,14 +241,20 @@ void JoinStrides(std::array<StrideModel, 2>& strides) {
       }
       point.root_m += weight * kShare * (RootFromFeet(to) - RootFromFeet(from));
     };
-    constexpr int kHalf = kPointCount / 2;
-    for (int i = 0; i < kHalf; ++i) {
-      const double weight = 1.0 - SmoothStep(static_cast<double>(i) / kHalf);
+    // The correction fades over kFadePart of the time of a stride. Points are not evenly spaced in
+    // time: a third of them is in double support, which may be very short.
+    const auto weight_at = [](const StrideModel& stride, std::size_t point, double end_s) {
+      const double fade_s = kFadePart * (stride.keytimes_s.back() - stride.keytimes_s.front());
+      return 1.0 - SmoothStep(std::fabs(TimeAtPoint(stride.keytimes_s, point) - end_s) / fade_s);
+    };
+    for (std::size_t i = 0; i < kPointCount; ++i) {
       // Feet are corrected in double support only, so that a standing foot stays flat.
       const double foot_weight = 1.0 - SmoothStep(static_cast<double>(i) / kPointsPerInterval);
-      correct(end, start, weight, foot_weight,
-              before.points[static_cast<std::size_t>(kPointCount - 1 - i)]);
-      correct(start, end, weight, foot_weight, after.points[static_cast<std::size_t>(i)]);
+      const std::size_t last = kPointCount - 1 - i;
+      correct(end, start, weight_at(before, last, before.keytimes_s.back()), foot_weight,
+              before.points[last]);
+      correct(start, end, weight_at(after, i, after.keytimes_s.front()), foot_weight,
+              after.points[i]);
     }
     before.end_velocity = after.start_velocity =
         0.5 * (before.MeasuredEndVelocity() + after.MeasuredStartVelocity());

@@ -41,7 +41,7 @@ struct StrideModel {
 
 /// Makes the strides of both feet continue each other. The end of one and the start of the other
 /// are measured on different steps, so they differ. Both get the mean posture and velocity,
-/// and the differences are distributed over half of each stride.
+/// and the differences are distributed over 45 % of the time of each stride.
 void JoinStrides(std::array<StrideModel, 2>& strides);
 
 /// Returns the time of a point of a stride with these keytimes.

@@ -162,6 +162,36 @@ TEST(MeasureStride, KeepsTheSpeedOfThePelvisEven) {
   }
 }
 
+// Strides of an even walk whose double support takes 0.03 s. At the end of a stride, the root is
+// 5 cm further ahead than at the start of the next one. The difference must not be distributed over
+// the double support alone.
+TEST(JoinStrides, DistributesDifferencesOverTimeRatherThanOverPoints) {
+  constexpr double kSpeedMPerS = 1.2;
+  constexpr double kDifferenceM = 0.05;
+  std::array<complete::StrideModel, 2> strides;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    complete::StrideModel& stride = strides[static_cast<std::size_t>(foot)];
+    stride.keytimes_s = {0.0, 0.03, 0.47, 0.5};
+    for (std::size_t p = 0; p < complete::kPointCount; ++p) {
+      complete::PostureSample& point = stride.points.emplace_back();
+      const double time_s = complete::TimeAtPoint(stride.keytimes_s, p);
+      point.root_m = DVec3(0.0, 0.9, (kSpeedMPerS + kDifferenceM / 0.5) * time_s);
+      point.rotations.assign(1, DQuat(1.0, 0.0, 0.0, 0.0));
+      point.ankles.fill(DQuat(1.0, 0.0, 0.0, 0.0));
+      point.balls_m[static_cast<std::size_t>(foot)].z = kSpeedMPerS * (2.0 * time_s - 0.5);
+    }
+  }
+  complete::JoinStrides(strides);
+  for (const complete::StrideModel& stride : strides) {
+    for (std::size_t p = 1; p < complete::kPointCount; ++p) {
+      const double way_m = stride.points[p].root_m.z - stride.points[p - 1].root_m.z;
+      const double passed_s = complete::TimeAtPoint(stride.keytimes_s, p) -
+                              complete::TimeAtPoint(stride.keytimes_s, p - 1);
+      EXPECT_NEAR(way_m / passed_s, kSpeedMPerS, 0.35) << "point " << p;
+    }
+  }
+}
+
 TEST(CompleteLibrary, StopsEndInTheStandPose) {
   const RawLibrary library = Completed(WalkWithoutStop());
   int stops = 0;
