@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/library/locomotion_profile.h"
 #include "runtime/plan/foot_sampler.h"
 
 namespace stridewire {
@@ -18,6 +19,9 @@ constexpr double kMaxApproachS = 0.8;
 constexpr double kVerticalWeight = 0.4;
 // On terrain the blend is shorter, because a leg that climbs or descends reaches less far.
 constexpr double kMaxTerrainApproachS = 0.35;
+// In strides it is shorter, too. The pelvis would otherwise be behind its place when it passes the
+// standing foot, where each centimetre bends the knee by several degrees.
+constexpr double kMaxStrideApproachS = 0.35;
 constexpr double kApproachStepS = 0.02;
 
 double HorizontalLength(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
@@ -44,6 +48,16 @@ double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least
     over_s = std::min(over_s + kApproachStepS, most_s);
   }
   return over_s;
+}
+
+// Returns true if the feet are apart in the walking direction at the start and end of a step. Uses
+// the heading at the start for both: replicas do not know how far the examples turn.
+bool IsStride(const FootPlan& plan, double heading_rad) {
+  const auto ahead_m = [&](const Footprint& left, const Footprint& right) {
+    return std::fabs(RotateYaw(-heading_rad, left.position_m - right.position_m).z);
+  };
+  return std::min(ahead_m(plan.feet[0].from, plan.feet[1].from),
+                  ahead_m(plan.feet[0].to, plan.feet[1].to)) > kFeetApartForwardM;
 }
 
 }  // namespace
@@ -80,8 +94,10 @@ void PlanRootApproach(const FootPlanJob& job) {
     const double eased = step_s / ease_out_s;
     offset_m_s = (next_m - EaseOut(eased) * offset_m) / (ease_out_s * EaseOutSlope(eased));
   }
-  const double most_s = std::min(plan.keeps_above_ground ? kMaxTerrainApproachS : kMaxApproachS,
-                                 movement.duration_s() - start_s);
+  const double longest_s = plan.keeps_above_ground                     ? kMaxTerrainApproachS
+                           : IsStride(plan, movement.base.heading_rad) ? kMaxStrideApproachS
+                                                                       : kMaxApproachS;
+  const double most_s = std::min(longest_s, movement.duration_s() - start_s);
   DVec3 residual_m = plan.root_residual_m;
   DVec3 residual_m_s = plan.root_residual_m_s;
   residual_m.y = residual_m_s.y = 0.0;  // Fades over kRootRisePart of the movement.
