@@ -89,7 +89,7 @@ void ExpectASmoothWalk(const Library& library, double low_m, double high_m, unsi
   EXPECT_EQ(walk->movements.back().base.position_m.y, 0.0);
 }
 
-void ExpectAStraightWalk(const Library& library, double length_m) {
+void ExpectAStraightWalk(const Library& library, double length_m, double max_aside_m) {
   const auto walk = Synthesize(
       {.library = library, .requests = RandomSteps(100, length_m, length_m, 1), .fps = kFps});
   ASSERT_TRUE(walk.has_value()) << Describe(walk.error());
@@ -97,7 +97,7 @@ void ExpectAStraightWalk(const Library& library, double length_m) {
   const BaseFrame& base = walk->movements[99].base;
   std::printf("100 steps of %.2f m: %.3f m aside, %.3f deg turned, %.1f m on\n", length_m,
               base.position_m.x, base.heading_rad * kDegrees, base.position_m.z);
-  EXPECT_LE(std::fabs(base.position_m.x), 0.2);
+  EXPECT_LE(std::fabs(base.position_m.x), max_aside_m);
   EXPECT_LE(std::fabs(base.heading_rad) * kDegrees, 1.0);
   EXPECT_GT(base.position_m.z, 90 * length_m);
 }
@@ -105,7 +105,7 @@ void ExpectAStraightWalk(const Library& library, double length_m) {
 TEST(BuiltinWalk, IsSmooth) { ExpectASmoothWalk(Builtin(), 0.35, 0.75, 200); }
 
 TEST(BuiltinWalk, IsStraightWithEqualSteps) {
-  for (const double length_m : {0.35, 0.55, 0.75}) ExpectAStraightWalk(Builtin(), length_m);
+  for (const double length_m : {0.35, 0.55, 0.75}) ExpectAStraightWalk(Builtin(), length_m, 0.2);
 }
 
 class CapturedWalk : public testing::TestWithParam<bool> {
@@ -122,7 +122,8 @@ class CapturedWalk : public testing::TestWithParam<bool> {
 TEST_P(CapturedWalk, IsSmooth) { ExpectASmoothWalk(library_, 0.45, 0.77, 216); }
 
 TEST_P(CapturedWalk, IsStraightWithEqualSteps) {
-  for (const double length_m : {0.55, 0.65, 0.75}) ExpectAStraightWalk(library_, length_m);
+  // Without mirror images, steps of one foot lead a little further aside than those of the other.
+  for (const double length_m : {0.55, 0.65, 0.75}) ExpectAStraightWalk(library_, length_m, 0.7);
 }
 
 INSTANTIATE_TEST_SUITE_P(AllAndAveraged, CapturedWalk, testing::Bool(),

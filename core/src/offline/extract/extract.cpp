@@ -264,8 +264,10 @@ class Extractor {
   [[nodiscard]] bool IsStraight(const StepSegment& step, double& heading) const {
     const double turn = Heading(step.end) - Heading(step.start);
     if (!IsLevel(step) || std::fabs(turn) > options_.straight_turn_max_rad) return false;
-    const DVec3& start = Pelvis(step.start);
-    const DVec3& end = Pelvis(step.end);
+    // The pelvis sways over the standing foot, so its path leads to one side in one step and to the
+    // other side in the next. The path of the feet does not.
+    const DVec3 start = FeetCentre(step.start);
+    const DVec3 end = FeetCentre(step.end);
     if (HorizontalDistance(start, end) > options_.displacement_heading_min_m) {
       const double direction = UnwrapAngle(HeadingBetween(start, end), heading);
       if (std::fabs(direction - heading) > options_.straight_drift_max_rad) return false;

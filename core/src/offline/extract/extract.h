@@ -18,16 +18,16 @@ struct ExtractOptions {
   SegmentOptions segments;
   // Steps that satisfy the following four conditions are straight.
   double straight_turn_max_rad = 0.0698;  ///< Limit on the turn of the stride heading; 4 degrees.
-  /// Limit on the angle between the motion of the root and the heading; 15 degrees. Steps with a
+  /// Limit on the angle between the motion of the feet and the heading; 15 degrees. Steps with a
   /// larger angle lead sideways or backward.
   double straight_drift_max_rad = 0.262;
   /// Limit on the difference between the heights of the ground under the two feet.
   double level_rise_max_m = 0.05;
   /// Limit on the sideways distance of the moving from the fixed foot, on its own side.
-  double straight_side_max_m = 0.35;
-  /// If the root moves farther than this, its direction determines the heading more accurately than
-  /// the pelvis.
-  double displacement_heading_min_m = 0.2;
+  double straight_side_max_m = 0.3;
+  /// If the centre of the feet moves farther than this, its direction determines the heading more
+  /// accurately than the pelvis.
+  double displacement_heading_min_m = 0.3;
   /// If true, a figure that walks on the spot is moved such that its supporting foot stands still.
   /// Otherwise such captures are rejected.
   bool derive_root_motion = false;
