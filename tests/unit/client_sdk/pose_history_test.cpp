@@ -63,6 +63,7 @@ TEST(PoseHistory, InterpolatesAnyNumberOfRotationsWithTheSameBits) {
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   std::mt19937 random(kSeed);
   std::normal_distribution<float> normal;
+  const Vec3 origin_m(0.0f);
   for (std::size_t joints = 1; joints <= 35; ++joints) {
     std::array<std::vector<Quat>, 4> keys;
     for (auto& key : keys) {
@@ -77,7 +78,7 @@ TEST(PoseHistory, InterpolatesAnyNumberOfRotationsWithTheSameBits) {
       // Keys at 0, 1, 2 and 3 s: the slope at the start is a secant of 2 s, or of 1 s.
       const float start_slope = u * (1.0f - u) * (1.0f - u) * (is_before ? 1.0f : 0.5f);
       const float end_slope = u * u * (u - 1.0f) * 0.5f;
-      const auto pose = [&](std::size_t k) { return ConstPoseSpan{Vec3(0.0f), keys[k]}; };
+      const auto pose = [&](std::size_t k) { return ConstPoseSpan{origin_m, keys[k]}; };
       Vec3 root_m;
       std::vector<Quat> rotations(joints);
       InterpolatePose({.times_s = {0.0, 1.0, 2.0, 3.0},
