@@ -334,7 +334,7 @@ test('uses the next address if a server does not answer or shuts down', {skip}, 
     assert.ok((await world.joined).ok);
     assert.ok(errors[0]!.startsWith(`${gone.url}: `), errors[0]);
     assert.equal(errors.length, 1);
-    // Servers that shut down tell their clients, which then move to the next address.
+    // Servers that shut down announce it to their clients, which then move to the next address.
     await first.kill('SIGTERM');
     await until('the client has moved', () => client.state === 'ready' && errors.length === 2);
     assert.ok(errors[1]!.startsWith(`${first.url}: `), errors[1]);
