@@ -23,6 +23,7 @@ constexpr double kMaxTerrainApproachS = 0.35;
 // standing foot, where each centimetre bends the knee by several degrees.
 constexpr double kMaxStrideApproachS = 0.35;
 constexpr double kApproachStepS = 0.02;
+constexpr double kApproachToleranceS = 1e-7;
 
 double HorizontalLength(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 
@@ -40,12 +41,23 @@ double PeakAcceleration(const DVec3& offset_m, const DVec3& offset_m_s, double o
 }
 
 // Returns the shortest time from `least_s` to `most_s` in which the root can go from `offset_m`
-// with velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2.
+// with velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2. Bisects between
+// two steps of the search, so that a rounding error does not change the result by a whole step.
 double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least_s, double most_s) {
-  double over_s = least_s;
-  while (over_s < most_s &&
-         PeakAcceleration(offset_m, offset_m_s, over_s) > kMaxAccelerationMPerS2) {
+  const auto exceeds = [&](double over_s) {
+    return PeakAcceleration(offset_m, offset_m_s, over_s) > kMaxAccelerationMPerS2;
+  };
+  double too_short_s = least_s;
+  if (!exceeds(too_short_s)) return least_s;
+  double over_s = std::min(least_s + kApproachStepS, most_s);
+  while (exceeds(over_s)) {
+    if (over_s >= most_s) return most_s;
+    too_short_s = over_s;
     over_s = std::min(over_s + kApproachStepS, most_s);
+  }
+  while (over_s - too_short_s > kApproachToleranceS) {
+    const double middle_s = 0.5 * (too_short_s + over_s);
+    (exceeds(middle_s) ? too_short_s : over_s) = middle_s;
   }
   return over_s;
 }
