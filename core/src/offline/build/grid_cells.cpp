@@ -17,6 +17,9 @@ constexpr int kMinCells = 2;
 constexpr int kMaxCells = 400;
 constexpr double kGrowth = 1.15;
 constexpr int kMaxRounds = 20;
+// Values that differ by less are equal. Numbers of frames are often exactly between two numbers of
+// cells, and rounding errors must not decide between them.
+constexpr double kTie = 1e-5;
 constexpr int kSamples = 24;  // Number of samples per interval and example.
 static_assert(kMaxCells * kMaxIntervals < MotionLibrary::kMaxGridPoints);
 
@@ -83,8 +86,8 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
   for (std::size_t i = 0; i < intervals; ++i) {
     const IntervalLength length = LengthOf(group, i);
     const auto cells_at = [](double length_s, double rate) {
-      return static_cast<int>(
-          std::lround(std::clamp(length_s * rate, double{kMinCells}, double{kMaxCells})));
+      const double exact = std::clamp(length_s * rate, double{kMinCells}, double{kMaxCells});
+      return static_cast<int>(std::ceil(exact - 0.5 - kTie));
     };
     cells[i] = cells_at(length.mean_s, fps);
     most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
@@ -103,9 +106,9 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
       for (std::size_t i = 0; i < intervals; ++i) {
         mean += errors[i] * (keys[i + 1] - keys[i]) / keys.back();
       }
-      if (mean <= kStoredErrorRad) return true;
+      if (mean <= kStoredErrorRad * (1.0 + kTie)) return true;
       for (std::size_t i = 0; i < intervals; ++i) {
-        if (errors[i] >= mean) grows[i] = true;
+        if (errors[i] >= mean * (1.0 - kTie)) grows[i] = true;
       }
       return false;
     });
