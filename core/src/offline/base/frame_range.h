@@ -2,7 +2,7 @@
 
 namespace stridewire {
 
-/// A range of frames of a capture: [begin, end).
+/// A range of frames of a capture. Includes `begin`, excludes `end`.
 struct FrameRange {
   int begin = 0;
   int end = 0;

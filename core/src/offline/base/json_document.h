@@ -9,9 +9,12 @@
 namespace stridewire {
 
 /// Parses untrusted JSON without exceptions. Limits the nesting and rejects duplicate keys. The
-/// caller must limit the size of `text`; the document uses up to about 50 times as much memory.
-/// Errors: kMalformed; kOutOfRange for a number too large for a double; kLimitExceeded for nesting.
-/// `where` is "name:line:column", both counted from 1, columns in bytes.
+/// caller must limit the size of `text`, because the document uses up to about 50 times as much
+/// memory.
+///
+/// Errors: kMalformed for invalid JSON, kOutOfRange for a number too large for a double, and
+/// kLimitExceeded for too deep nesting. Error::where is "name:line:column". Lines and columns count
+/// from 1, and columns are in bytes.
 [[nodiscard]] Expected<nlohmann::json> ParseJson(std::string_view text, std::string_view name,
                                                  int max_depth);
 

@@ -24,7 +24,7 @@ std::string Printable(const std::string& key) {
 Status CheckKeys(const JsonField& field, std::initializer_list<const char*> known) {
   if (!field.value.is_object()) {
     std::string where = field.where;
-    // An empty path means the whole document.
+    // An empty path stands for the whole document.
     if (where.ends_with(": ")) where.resize(where.size() - 2);
     return Fail(ErrorCode::kMalformed, "expected an object", std::move(where));
   }

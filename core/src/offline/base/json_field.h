@@ -49,8 +49,8 @@ struct JsonLimit {
 [[nodiscard]] Status ReadRequiredNumber(const JsonField& field, const char* key,
                                         const JsonLimit& limit, double& out);
 
-/// Reads a file, but at most `max_bytes` + 1 bytes; a longer result tells the caller that the file
-/// exceeds its limit. Errors: kNotFound or kIo with the file in `where`.
+/// Reads at most `max_bytes` + 1 bytes of a file. If the result is longer than `max_bytes`, the
+/// file exceeds the caller's limit. Errors: kNotFound or kIo, with the file in Error::where.
 [[nodiscard]] Expected<std::string> ReadTextFile(const std::filesystem::path& path,
                                                  std::size_t max_bytes);
 

@@ -7,9 +7,9 @@ namespace stridewire {
 /// Returns the maximum of each value and of the `half` values before and after it.
 [[nodiscard]] std::vector<double> MovingMaximum(const std::vector<double>& values, int half);
 
-/// Returns the weighted mean of each value and of the values around it. `weights` has an odd size,
-/// and its middle belongs to the value itself. The first and the last value continue beyond the
-/// ends.
+/// Returns, for each value, the weighted mean of it and its neighbours. `weights` has an odd size,
+/// and its middle element is the weight of the value itself. Beyond both ends, the first and the
+/// last value are repeated.
 [[nodiscard]] std::vector<double> MovingMean(const std::vector<double>& values,
                                              const std::vector<double>& weights);
 

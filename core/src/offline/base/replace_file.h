@@ -8,9 +8,9 @@
 
 namespace stridewire {
 
-// Writes a file such that a partial file is never visible: `write` fills a temporary file next to
-// `path`, which is then renamed. On failure the old file remains. Errors: those of `write`, or kIo;
-// `where` is the path.
+// Replaces a file, so that other programs never see a partial file. `write` fills a temporary file
+// next to `path`, which is then renamed. On failure the old file remains. Errors: those of `write`,
+// or kIo. Error::where is the path.
 [[nodiscard]] Status ReplaceFile(const std::filesystem::path& path,
                                  const std::function<Status(std::ostream&)>& write);
 

@@ -16,9 +16,10 @@ namespace stridewire {
 namespace {
 
 constexpr double kFastTurnRadS = 10.5;  // 600 degrees/s.
-// A joint above the legs moves if its position varies by more than this share of a leg: 2 cm.
+// A joint above the legs counts as moving if its position varies by more than this fraction of the
+// leg length (2 cm for an adult).
 constexpr double kMovesShare = 0.024;
-// A side branch above the legs with this many joints is a part of the body, not a prop.
+// A side branch above the legs with at least this many joints is a part of the body, not a prop.
 constexpr int kBodyJoints = 8;
 
 bool IsBelow(const std::vector<BvhJoint>& joints, int j, int ancestor) {
@@ -154,7 +155,7 @@ class FigureBuilder {
     return legs;
   }
 
-  // Returns true if a branch is a part of the body, such as the spine.
+  // Returns true if a branch is a part of the body, for example the spine.
   bool IsBody(int branch) const {
     int count = 0;
     for (int j = branch; j < end_; ++j) {
@@ -166,8 +167,9 @@ class FigureBuilder {
     return count >= kBodyJoints;
   }
 
-  // Finds the root of the figure: the highest joint above the legs that carries a part of the body,
-  // but not above a joint that moves in its parent, since only the root can have positions.
+  // Finds the root of the figure: the highest joint above the legs from which a part of the body
+  // branches off. The root may not be above a joint that moves relative to its parent, because only
+  // the root can have positions.
   void FindRoot() {
     for (int j = figure_.legs.root; j >= 0; j = file_.joints[Index(j)].parent) chain_.push_back(j);
     std::ranges::reverse(chain_);
@@ -287,8 +289,8 @@ class FigureBuilder {
     });
   }
 
-  // Composes the rotations of the joints above the root, as far as they are constant: from the top
-  // joint down to the first one whose rotation changes.
+  // Composes the constant rotations above the root: those of the top joint and of the joints below
+  // it, up to the first joint whose rotation changes.
   void FindFixedTurn() {
     for (std::size_t i = 0; i < root_; ++i) {
       const DQuat first = motion_.LocalRotation(figure_.first_frame, chain_[i]);
@@ -299,7 +301,7 @@ class FigureBuilder {
     }
   }
 
-  // Returns the number of joints that turn between frames `f` and `f` + 1 faster than people can.
+  // Returns the number of joints that rotate faster than people can between frames `f` and `f` + 1.
   int FastJoints(int f) const {
     const Clip& clip = figure_.clip;
     int fast = 0;
@@ -319,8 +321,8 @@ class FigureBuilder {
       const double second = AngleBetween(clip.frame(1).rotations[j], clip.frame(2).rotations[j]);
       jumping += first > std::numbers::pi / 18.0 && first > 8.0 * second;
     }
-    // Some programs blend from the artificial pose into the motion. Then no joint jumps, but the
-    // root starts with exactly no rotation and many joints turn fast.
+    // Some programs blend from the artificial pose into the motion. No joint then jumps, but the
+    // root starts with exactly the identity rotation, and many joints rotate fast.
     const bool root_at_rest = AngleBetween(clip.frame(0).rotations[0], kIdentityQuat) < 1e-6 &&
                               AngleBetween(clip.frame(1).rotations[0], kIdentityQuat) > 1e-3;
     if (jumping < 4 && !(root_at_rest && FastJoints(0) >= 4)) return;
@@ -394,7 +396,8 @@ class FigureBuilder {
 
 DVec3 BvhFigure::FootVector(const FoundLeg& leg) const {
   if (leg.ball < 0) return FarthestTip(leg.ankle);
-  // Toe joints are below the ankle, and joints between them are helpers that do not turn.
+  // Toe joints are below the ankle. Joints between ankle and toe joint are helpers that do not
+  // rotate.
   DVec3 v(0.0);
   for (int j = leg.ball; j != leg.ankle; j = joints[Index(j)].parent) {
     v += DVec3(joints[Index(j)].offset_m);

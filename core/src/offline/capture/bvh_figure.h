@@ -15,14 +15,14 @@ namespace stridewire {
 /// Number of frames that are sampled to determine the directions and the shape of a figure.
 inline constexpr int kSampledFrames = 64;
 
-/// A joint other than the root whose position channels are replaced by their mean.
+/// A joint below the root whose position channels are replaced with their mean.
 struct AveragedJoint {
   int joint = 0;
   double deviation = 0.0;  ///< Largest distance from the mean in any frame, in file units.
 };
 
-/// The figure of a BVH file with its motion, in the axes and the unit of the file. Its root is the
-/// lowest joint above both legs and the upper body, and it contains the motion of all joints above.
+/// The figure of a BVH file with its motion, in the axes and the unit of the file. The root is the
+/// lowest joint above both legs and the upper body. It contains the motion of all joints above it.
 struct BvhFigure {
   std::vector<Joint> joints;
   std::vector<EndSite> end_sites;
@@ -34,26 +34,26 @@ struct BvhFigure {
   /// Product of the constant rotations of the joints above the root. It applies to the rest pose of
   /// the file as well.
   DQuat fixed_turn = DQuat(1.0, 0.0, 0.0, 0.0);
-  int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
+  int first_frame = 0;  ///< Number of frames at the start that contain an artificial rest pose.
   std::vector<AveragedJoint> averaged;
   std::vector<std::string> notes;
 
   /// Returns the direction of the foot in the frame of its ankle: the vector to the toe joint, or
   /// to the farthest tip.
   [[nodiscard]] DVec3 FootVector(const FoundLeg& leg) const;
-  /// Returns the offset of the farthest End Site or child of joint `of`.
+  /// Returns the offset of the farthest End Site or child of joint `of`, in the frame of the joint.
   [[nodiscard]] DVec3 FarthestTip(int of) const;
 
   /// Computes the positions and the world rotations of all joints. Frame -1 is the rest pose.
   void ComputePose(int frame, std::vector<DVec3>& positions, std::vector<DQuat>& rotations) const;
 };
 
-/// Selects the figure of a file by its legs and merges the joints above it into its root. Other
-/// joints above the root that carry no part of the body are left out, as are other figures and
-/// props. Releases the values of `file`. `fps` is the frame rate of the motion.
+/// Selects the figure of a file by its legs and merges the joints above its root into the root. The
+/// result does not contain other figures, props, and joints above the root that carry no part of
+/// the body. Releases the values of `file`. `fps` is the frame rate of the motion.
 ///
-/// Errors: those of FindLegs, with `name` in `where`. kInvalidArgument or kNotFound for an option,
-/// with its name in `where`.
+/// Errors: those of FindLegs, with `name` in Error::where. kInvalidArgument or kNotFound for an
+/// option, with its name in Error::where.
 [[nodiscard]] Expected<BvhFigure> MakeBvhFigure(BvhFile file, const std::string& name, double fps,
                                                 const BvhReadOptions& options);
 

@@ -34,7 +34,7 @@ constexpr const char* kMixedPointText =
     "expected a number with the same decimal mark as the others; the file mixes commas and points";
 constexpr const char* kFewerNumbersText = "the frame has fewer numbers than channels";
 constexpr int kMaxChannels = 9;
-constexpr std::size_t kMaxNumberBytes = 64;  // Longest number with a decimal comma.
+constexpr std::size_t kMaxNumberBytes = 64;  // Maximum length of a number with a decimal comma.
 
 // Parses a finite number within kMaxBvhNumber. Values too small for a double become zero.
 NumberFault ParseNumber(std::string_view token, double& value) {
@@ -159,7 +159,7 @@ class Parser {
     }
   }
 
-  // Returns the next word; a brace is a word of its own. Empty at the end of the text.
+  // Returns the next word. A brace is a word. Returns an empty string at the end of the text.
   std::string_view Next() {
     SkipSpace();
     token_line_ = line_;
@@ -469,8 +469,7 @@ class Parser {
   Status ParseRows() {
     const std::size_t channels = static_cast<std::size_t>(file_.channel_count);
     const std::int64_t joints = static_cast<std::int64_t>(file_.joints.size());
-    // A number takes at least two characters including its separator, which limits the number of
-    // rows.
+    // A number takes at least two characters with its separator. This limits the number of rows.
     const std::size_t most_rows = (text_.size() - at_) / (2 * channels) + 1;
     file_.values.reserve(channels *
                          std::min(most_rows, static_cast<std::size_t>(declared_frames_)));

@@ -11,7 +11,7 @@ namespace stridewire {
 
 enum class BvhChannelKind { kPosition, kRotation, kScale };
 
-/// The meaning of one number per frame. BvhJoint::first_channel assigns channels to joints.
+/// Describes one column of the motion data. BvhJoint::first_channel assigns columns to joints.
 struct BvhChannel {
   BvhChannelKind kind = BvhChannelKind::kPosition;
   int axis = 0;  ///< 0: x, 1: y, 2: z.
@@ -23,7 +23,7 @@ struct BvhJoint {
   int line = 0;               ///< Line number of the joint's OFFSET.
   DVec3 offset = DVec3(0.0);  ///< The joint's OFFSET, in file units.
   std::vector<BvhChannel> channels;
-  int first_channel = 0;  ///< Index of the joint's first number in the row of a frame.
+  int first_channel = 0;  ///< Index of the joint's first number in each row.
 };
 
 struct BvhEndSite {
@@ -49,8 +49,8 @@ struct BvhFile {
   std::vector<std::string> notes;
 };
 
-/// Parses a BVH file and checks its syntax, but not whether it describes a person. `name` is the
-/// beginning of every `where`. See ReadBvh for the deviations from the format that are accepted.
+/// Parses a BVH file. Checks its syntax, but not whether it describes a person. `name` is the
+/// beginning of every Error::where. ReadBvh lists the accepted deviations from the format.
 [[nodiscard]] Expected<BvhFile> ParseBvhFile(std::string_view text, std::string_view name);
 
 }  // namespace stridewire

@@ -21,13 +21,13 @@ class BvhMotion {
   /// joint below a root are zero, its OFFSET is kept.
   [[nodiscard]] bool HasPositions(int joint) const;
 
-  /// Mean of LocalPosition over the frames from `first_frame`.
+  /// Mean of LocalPosition over all frames from `first_frame` on.
   [[nodiscard]] DVec3 MeanPosition(int joint, int first_frame) const;
-  /// Largest distance of LocalPosition from `mean` over the frames from `first_frame`.
+  /// Largest distance of LocalPosition from `mean` in all frames from `first_frame` on.
   [[nodiscard]] double Deviation(int joint, int first_frame, const DVec3& mean) const;
 
-  /// Returns the shape of the joints from `begin` to `end`, which belong to one root, numbered from
-  /// 0. Joints with positions have their mean as offset.
+  /// Returns the shape of the joints in [begin, end), which belong to one root. The result numbers
+  /// them from 0. The offset of a joint with positions is their mean.
   [[nodiscard]] FigureShape ShapeOf(int begin, int end, int sampled_frames) const;
 
  private:

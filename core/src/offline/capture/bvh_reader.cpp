@@ -29,9 +29,10 @@ namespace {
 constexpr double kStandingHipsM = 0.95;  // Hip height of a standing adult.
 constexpr double kSlowestFeetMS2 = 6.0;  // See NoteSlowMotion.
 constexpr double kMinTravelM = 0.15;
-// The mean of positions must not move a joint of the body farther than this from its place.
+// Largest distance of a joint of the body from its mean position. The mean becomes the offset of
+// the joint, so larger distances are rejected.
 constexpr double kMaxDeviationM = 0.02;
-// A joint carries the body if the bones below it are at least this long, in leg lengths.
+// A joint carries the body if a chain of bones below it is at least this long, in leg lengths.
 constexpr double kBodyShare = 0.25;
 
 struct KnownUnit {
@@ -140,8 +141,8 @@ class Reader {
                 leg * capture_.unit_m));
       return {};
     }
-    // Estimates the height of standing hips from the bones: root above hips, legs, ankle above
-    // ball.
+    // Estimates the hip height of the standing figure as a sum of bone lengths: from the root to
+    // the hips, along the legs, and from the ankle to the ball.
     std::vector<DVec3> p;
     std::vector<DQuat> rotations;
     figure_.ComputePose(-1, p, rotations);
@@ -178,8 +179,9 @@ class Reader {
     });
   }
 
-  // Rejects positions of the legs, the trunk and the limbs that differ from their mean, which
-  // becomes the offset. Props, fingers and the like get a note.
+  // The offset of a joint becomes the mean of its positions. Rejects files in which positions of
+  // the legs, the trunk or the limbs differ too much from their mean. Other joints, such as props
+  // and fingers, get a note.
   Status CheckPositions() {
     const AveragedJoint* worst = nullptr;
     const std::vector<double> below = LengthsBelow();

@@ -19,7 +19,7 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-// Appends the shortest decimal number that reads back as the same float, without an exponent.
+// Appends the shortest decimal number that is read as the same float. Uses no exponent.
 void AppendFloat(std::string& text, float value) {
   if (value == 0.0f) value = 0.0f;  // Avoids "-0".
   char buffer[128];
@@ -51,7 +51,7 @@ std::string BvhName(const std::string& name) {
 }
 
 struct Angles {
-  double z = 0.0, y = 0.0, x = 0.0;  // Angles in radians, with R = Rz Ry Rx.
+  double z = 0.0, y = 0.0, x = 0.0;  // Angles in radians. The rotation is R = Rz Ry Rx.
 };
 
 // Decomposes a rotation into Euler angles. Of the two solutions, returns the one nearer to the

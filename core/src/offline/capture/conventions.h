@@ -9,7 +9,7 @@
 
 namespace stridewire {
 
-/// Conventions that the reader assumed for a file, and the properties they were derived from.
+/// Conventions that the reader assumed for a file, and what they were derived from.
 struct FileConventions {
   std::string path;
   BvhAxis up = BvhAxis::kPlusY;
@@ -22,21 +22,23 @@ struct FileConventions {
 
 [[nodiscard]] FileConventions ConventionsOf(const Capture& capture);
 
-/// The conventions with which a file has to be read so that it agrees with the other files.
+/// Conventions with which a file must be read so that it agrees with the other files.
 struct AgreedConventions {
-  std::optional<BvhAxis> up;       ///< Empty: as it was read.
-  std::optional<double> unit_m;    ///< Empty: as it was read.
+  std::optional<BvhAxis> up;       ///< nullopt: unchanged.
+  std::optional<double> unit_m;    ///< nullopt: unchanged.
   std::vector<std::string> notes;  ///< One sentence per difference from other files.
 };
 
-/// Compares the files of one build. `files` contains the files that could be read.
+/// Compares the files of one build and returns one element per file. `files` contains the files
+/// that could be read.
 ///
-/// - Files with the same joint names have the same up axis. If the rest pose of a file does not
-///   determine it, it is the axis of most of them. Files whose rest pose determines it count first.
+/// - Files with the same joint names get the same up axis. If the rest pose of a file does not
+///   determine the axis, the file gets the axis of most other files. Files whose rest pose
+///   determines it take precedence.
 /// - A file whose unit was estimated gets the unit of a file with the same joint names and a common
 ///   unit, if its legs are then between 0.5 and 1.2 m long.
-/// - Notes state which axis or unit a file got from the others, and which of them still differ from
-///   those of the first file.
+/// - Notes state which axis or unit a file got from other files. They also list the files that
+///   still differ from the first one.
 [[nodiscard]] std::vector<AgreedConventions> AgreeOnConventions(
     std::span<const FileConventions> files);
 

@@ -16,13 +16,13 @@ namespace stridewire {
 namespace {
 
 constexpr double kSnapCos = 0.906;  // Directions within 25 degrees of an axis snap to it.
-// A rest pose stands if the cosine of the angle between its legs and an axis is at least kRestCos,
-// and if the vectors from its ankles to its hips are at least kStraightShare of the leg length.
+// A rest pose is standing if the cosine of the angle between its legs and an axis is at least
+// kRestCos, and if the distances from ankles to hips are at least kStraightShare of the leg length.
 constexpr double kRestCos = 0.8;
 constexpr double kStraightShare = 0.9;
-// Cosines of the angle between an axis and the mean direction from the feet to the hips. At least
-// kMotionCos: the figure stands along this axis. At least kWeakMotionCos: the feet are mostly on
-// this side of the hips, as in crawling.
+// Limits on the cosine of the angle between an axis and the mean direction from the feet to the
+// hips. From kMotionCos, the figure stands along this axis. From kWeakMotionCos, the feet are
+// mostly below the hips along this axis, as in crawling.
 constexpr double kMotionCos = 0.85;
 constexpr double kWeakMotionCos = 0.35;
 // The following distances are in leg lengths.
@@ -33,11 +33,11 @@ constexpr double kMinTravel = 0.6;
 constexpr double kTravelRatio = 2.0;
 // A figure on a level floor moves less than this along the up axis.
 constexpr double kMaxRise = 0.3;
-// The fixed rotation of the joints above the root applies to the up axis of the rest pose if it
-// increases the cosine of the angle to the mean direction from the feet to the hips by at least
-// this much (RestUpInWorld).
+// The fixed rotation of the joints above the root is applied to the up axis of the rest pose if
+// this brings the axis closer to the mean direction from the feet to the hips: the cosine of the
+// angle between them must increase by at least this much (RestUpInWorld).
 constexpr double kClearGain = 0.5;
-// If the sum of both unit foot vectors is shorter, the feet have no common direction.
+// If the sum of the two unit foot vectors is shorter than this, the feet have no common direction.
 constexpr double kClearFeet = 0.5;
 
 DVec3 Unit(const DVec3& v) {
@@ -80,8 +80,8 @@ class AxesFinder {
     const DVec3 world_up = AxisVector(axes_.up);
     DVec3 rest_up = AxisVector(rest_axis_);
     if (!rest_stands_) {
-      // In rigs whose bones are all parallel at rest, up is the mean world up in the frame of the
-      // root over the motion.
+      // The bones of some rigs are all parallel at rest. For these, up is the world up axis in the
+      // frame of the root, averaged over the motion.
       DVec3 sum(0.0);
       for (const Sampled& sample : samples_) sum += glm::conjugate(sample.root) * world_up;
       rest_up = SnapAxis(sum);
@@ -127,7 +127,8 @@ class AxesFinder {
     return sum;
   }
 
-  // The rest pose stands if its legs are straight, parallel to an axis, and below the body.
+  // Determines whether the rest pose is standing: its legs are straight, parallel to an axis, and
+  // below the body.
   void ReadRestPose() {
     const DVec3 legs_up = LegsUp(rest_);
     rest_axis_ = NearestAxis(legs_up);
@@ -153,8 +154,8 @@ class AxesFinder {
 
   // The extent of the sampled motion along an axis, in file units.
   struct Extent {
-    double lowest = 0.0;  // Median position of the joint that is lowest along the axis.
-    double travel = 0.0;  // Range of the root, without the outermost 5 % at both ends.
+    double lowest = 0.0;  // Median height of the lowest joint along the axis.
+    double travel = 0.0;  // Range of the root's positions, without the lowest and the highest 5 %.
   };
   Extent ExtentAlong(const DVec3& axis) const {
     std::vector<double> lowest;
@@ -176,8 +177,8 @@ class AxesFinder {
     return IsAtZero(extent) && extent.travel < kMaxRise * leg_length_;
   }
 
-  // Returns true if the figure stands and moves along `up` as in a file whose up axis that is,
-  // instead of lying in a file with the up axis `other`.
+  // Returns true if the figure stands and walks with `up` as the up axis. Returns false if it could
+  // also be lying in a file whose up axis is `other`.
   bool StandsAlong(const DVec3& up, const DVec3& other) const {
     const Extent along_up = ExtentAlong(up);
     const Extent along_other = ExtentAlong(other);
@@ -186,10 +187,9 @@ class AxesFinder {
     return travels || (HasFloorAtZero(along_up) && !HasFloorAtZero(along_other));
   }
 
-  // Returns the up axis of the rest pose in the world. Joints above the root may turn the whole
-  // figure by a fixed rotation. Some programs export a figure with another up axis below such a
-  // joint, while in other files the motion of the hips undoes the rotation. The motion determines
-  // which of both is the case.
+  // Returns the up axis of the rest pose in the world. Joints above the root may rotate the whole
+  // figure by a constant rotation. In some files this rotation converts the up axis of the figure.
+  // In others the motion of the hips undoes it. The motion determines which case applies.
   DVec3 RestUpInWorld(const DVec3& mean_legs_up) const {
     const DVec3 plain = AxisVector(rest_axis_);
     const DVec3 turned = figure_.fixed_turn * plain;
@@ -248,9 +248,9 @@ class AxesFinder {
     }
   }
 
-  // Corrects the up axis of a figure that lies all the time. For such a figure, the direction from
-  // the feet to the hips is not up. Its feet are far from zero along that axis, while its lowest
-  // joints are near zero along the usual up axis.
+  // Corrects the up axis of a figure that lies in the whole motion, in which the direction from the
+  // feet to the hips is not up. Such a figure is recognized by its positions: along the assumed
+  // axis the feet are far from zero, and along the usual up axis the lowest joints are near zero.
   void AvoidLying() {
     const DVec3 up = AxisVector(axes_.up);
     const Extent along_up = ExtentAlong(up);
@@ -268,7 +268,7 @@ class AxesFinder {
     }
   }
 
-  // Returns the mean over the motion of a vector in the frame of the root.
+  // Averages a vector, in the frame of the root, over the motion.
   template <typename Vector>
   DVec3 MeanInRoot(Vector vector) const {
     DVec3 sum(0.0);
@@ -276,8 +276,9 @@ class AxesFinder {
     return sum / static_cast<double>(samples_.size());
   }
 
-  // Returns the level direction of the feet in the frame of the root: the mean over the motion, or
-  // that of the rest pose if the motion has no clear direction. Its length is at most 2.
+  // Returns the horizontal direction of the feet in the frame of the root. This is the mean over
+  // the motion, or the direction in the rest pose if the motion has no clear direction. Its length
+  // is at most 2.
   template <typename Level>
   DVec3 FindFeet(const Level& level) const {
     DVec3 feet(0.0);
@@ -291,8 +292,8 @@ class AxesFinder {
     return glm::length(at_rest) > glm::length(feet) ? at_rest : feet;
   }
 
-  // Returns the level direction from the right leg to the left one, between the first pair of
-  // joints that are apart: hips, knees or ankles.
+  // Returns the horizontal direction from the right leg to the left one, in the frame of the root.
+  // Uses the first of hips, knees and ankles that are apart.
   template <typename Level>
   DVec3 FindLeft(const Level& level) const {
     const FoundLeg(&legs)[2] = figure_.legs.legs;
@@ -321,7 +322,7 @@ class AxesFinder {
     const bool feet_are_clear = glm::length(feet) >= kClearFeet;
     DVec3 across = FindLeft(level);
     if (!legs.sides_known) {
-      // If forward is the direction of the feet, left is up x forward.
+      // The feet point forward, so left is up x forward.
       if (!feet_are_clear) {
         Note("left and right are guessed, since the feet have no clear direction");
       }
@@ -345,13 +346,13 @@ class AxesFinder {
     const DVec3 other = std::fabs(world_up.x) > 0.9 ? DVec3(0, 0, 1) : DVec3(1, 0, 0);
     axes_.world_turn = TurnToOurAxes(Unit(other - glm::dot(other, world_up) * world_up), world_up);
     if (!rest_stands_) {
-      // Directions from the motion differ between the files of one figure. All files must give the
-      // same skeleton, so the frames of the joints keep their axes.
+      // The direction from the motion differs between the files of one figure. All files must give
+      // the same skeleton, so joint frames are rotated only by the up axis.
       axes_.joint_turn = axes_.world_turn;
       return {};
     }
     axes_.joint_turn = TurnToOurAxes(left, rest_up);
-    // Uses the rotation of the joint frames for the world as well if the up axis then becomes +Y.
+    // Applies the rotation of the joint frames to the world as well if this makes +Y the up axis.
     const DQuat turn = glm::normalize(axes_.joint_turn * glm::conjugate(figure_.fixed_turn));
     if ((turn * world_up).y > 0.999) {
       axes_.world_turn = turn;
@@ -366,10 +367,11 @@ class AxesFinder {
   const std::string& name_;
   double leg_length_ = 0.0;  // Mean length of both legs.
   std::vector<DVec3> rest_;
-  std::vector<DQuat> rotations_;  // Scratch of ComputePose.
+  std::vector<DQuat> rotations_;  // Scratch memory of ComputePose.
   std::vector<Sampled> samples_;
   bool rest_stands_ = false;
-  BvhAxis rest_axis_ = BvhAxis::kPlusY;  // Direction of the resting legs, in the frame of the root.
+  // Up direction of the legs in the rest pose, in the frame of the root.
+  BvhAxis rest_axis_ = BvhAxis::kPlusY;
   FigureAxes axes_;
 };
 

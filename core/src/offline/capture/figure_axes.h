@@ -10,23 +10,25 @@
 
 namespace stridewire {
 
-/// Rotations from the axes of a file to ours: +Y up and, if the rest pose stands, facing +Z at
-/// identity rotations.
+/// Rotations from the axes of a file to our axes, in which +Y is up. If the rest pose is standing,
+/// it then faces +Z when all rotations are the identity.
 struct FigureAxes {
   BvhAxis up = BvhAxis::kPlusY;            ///< The up axis of the file.
   UpSource up_source = UpSource::kOption;  ///< What determined `up`.
-  bool rest_stands = false;                ///< The rest pose stands upright.
+  bool rest_stands = false;                ///< True if the rest pose is standing.
   /// Rotation from the world axes of the file to ours.
   DQuat world_turn = DQuat(1.0, 0.0, 0.0, 0.0);
   /// Rotation from the axes of the file's joint frames to the axes of ours.
   DQuat joint_turn = DQuat(1.0, 0.0, 0.0, 0.0);
 };
 
-/// Determines the axes of a figure. The up axis is `up` if it is set. Otherwise it is the up axis
-/// of a rest pose that stands, or else the mean direction from the feet to the hips over the
-/// motion. If both differ, the rest pose decides unless the figure clearly stands and moves along
-/// the other axis. If joint names do not contain the sides of the legs, determines the sides from
-/// the direction of the feet, and swaps the legs of `figure` if necessary. Adds notes to `figure`.
+/// Determines the axes of a figure. The up axis is `up` if it is set. Otherwise there are two
+/// estimates: the up axis of a standing rest pose, and the mean direction from the feet to the hips
+/// over the motion. If they differ, the rest pose decides unless the figure clearly stands and
+/// moves along the other axis.
+///
+/// If joint names do not contain the sides of the legs, the function determines the sides from the
+/// direction of the feet, and swaps the legs of `figure` if necessary. It adds notes to `figure`.
 ///
 /// Errors: kUnsupported if left and right cannot be determined.
 [[nodiscard]] Expected<FigureAxes> FindFigureAxes(BvhFigure& figure, std::optional<BvhAxis> up,

@@ -26,7 +26,7 @@ inline std::size_t Index(int i) { return static_cast<std::size_t>(i); }
   return static_cast<BvhAxis>(2 * largest + (v[largest] < 0.0 ? 1 : 0));
 }
 
-/// Returns the name of an axis, such as "+y".
+/// Returns the name of an axis, for example "+y".
 [[nodiscard]] inline const char* AxisName(BvhAxis axis) {
   static constexpr const char* kNames[] = {"+x", "-x", "+y", "-y", "+z", "-z"};
   return kNames[static_cast<int>(axis)];

@@ -9,15 +9,17 @@
 namespace stridewire {
 namespace {
 
-// An End Site nearer than this to the ankle is the ball of the foot; in leg lengths.
+// If an End Site is closer to the ankle than this, in leg lengths, it is the ball of the foot.
 constexpr double kFootEndIsBall = 0.2;
-constexpr double kBallShare = 2.0 / 3.0;  // Position of the ball between ankle and toe tip.
-constexpr double kSlowShare = 0.25;       // Fraction of the frames in which a foot is surely flat.
-// Toe tip of a foot without any bone: this far ahead of the ankle and below it, in leg lengths.
+// The ball is at this fraction of the way from ankle to toe tip.
+constexpr double kBallShare = 2.0 / 3.0;
+// A foot is assumed to be flat in this fraction of the frames, those with the slowest ankle.
+constexpr double kSlowShare = 0.25;
+// A foot without bones gets a toe tip this far ahead of the ankle and below it, in leg lengths.
 constexpr double kFootAhead = 0.24;
 constexpr double kFootBelow = 0.07;
-// A foot is flat at rest if it points forward by at least, and upward by at most, these shares of
-// its length.
+// A foot is flat in the rest pose if the vector from ankle to toes has at least this forward and at
+// most this upward component, as fractions of its length.
 constexpr double kRestForward = 0.7;
 constexpr double kRestUp = 0.2;
 
@@ -51,7 +53,7 @@ class FlatFoot {
     }
   }
 
-  // Returns the mean over the frames of a world vector, in the frame of a joint. `vector_in(f)`
+  // Returns the mean of a world vector over the frames, in the frame of a joint. `vector_in(f)`
   // returns the vector in frame f.
   template <typename VectorIn>
   [[nodiscard]] DVec3 MeanInFrameOf(int joint, const VectorIn& vector_in) const {
@@ -60,8 +62,8 @@ class FlatFoot {
     return sum / static_cast<double>(frames_.size());
   }
 
-  // Returns the horizontal part of a vector that is given in the frame of `joint`, in the frame of
-  // `in_joint`.
+  // Converts a vector from the frame of `joint` to the frame of `in_joint`, after removing its
+  // vertical component in the world.
   [[nodiscard]] DVec3 Flat(int joint, const DVec3& v, int in_joint) const {
     return MeanInFrameOf(in_joint, [&](int f) {
       const DVec3 world = RotationOf(f, joint) * v;

@@ -5,12 +5,13 @@
 
 namespace stridewire {
 
-/// Sets the joints of `leg`, and where the ball and the tip of the toes are. `figure` must be in
-/// metres and our axes, with +Y up and root positions in its clip. Adds notes to `figure`.
+/// Sets the joints of `leg`, its ball and its toe tip. `figure` must be in metres and in our axes,
+/// with root positions in its clip. Adds notes to `figure`.
 ///
-/// A foot without a toe joint gets its ball at two thirds of its length, as high as its tip. A toe
-/// joint without a tip is one third of the foot long. Heights are those of a flat sole: in the rest
-/// pose, if `rest_stands` and its feet point forward, and otherwise while the ankle is slowest.
+/// If there is no toe joint, the ball is placed at two thirds of the foot's length, at the height
+/// of the toe tip. If a toe joint has no tip, one third of the foot's length is added. Heights are
+/// those of a flat sole. The sole is flat in the rest pose if `rest_stands` and its feet point
+/// forward. Otherwise, it is assumed to be flat while the ankle is slowest.
 void SetFootShape(BvhFigure& figure, bool rest_stands, const FoundLeg& found, Leg& leg);
 
 }  // namespace stridewire

@@ -13,11 +13,11 @@ namespace stridewire {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-// Faster rotations are glitches. Arms reach about 1000 degrees/s in a jump.
+// Faster rotations are glitches. In a jump, arms rotate by up to about 1000 degrees/s.
 constexpr double kJumpRadPerS = 1800.0 * kDegree;
-// Smaller rotations are not glitches, but noise at 240 Hz and above.
+// Smaller rotations are noise of captures at 240 Hz and above, not glitches.
 constexpr double kJumpMinRad = 12.0 * kDegree;
-// Larger rotations per frame are always glitches. At 30 Hz, 1800 degrees/s would allow too much.
+// Larger rotations per frame are always glitches. At 30 Hz, 1800 degrees/s would be too permissive.
 constexpr double kJumpMaxRad = 60.0 * kDegree;
 constexpr double kSpikeS = 0.04;
 constexpr double kSpreadS = 0.08;
@@ -40,7 +40,7 @@ class Track {
   int joint_;
 };
 
-// Replaces the frames strictly between `before` and `after` by slerp between those two.
+// Interpolates the frames strictly between `before` and `after` by slerp.
 void Interpolate(Track& track, int before, int after) {
   STRIDEWIRE_CHECK(before < after);
   const Quat from = track[before];
@@ -58,7 +58,7 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
   const double limit = std::clamp(kJumpRadPerS / clip.fps, kJumpMinRad, kJumpMaxRad);
   const int spike = std::max(2, static_cast<int>(std::lround(kSpikeS * clip.fps)));
   const int spread = std::max(1, static_cast<int>(std::lround(0.5 * kSpreadS * clip.fps)));
-  // A jump at f is the rotation between f and f + 1.
+  // The jump at f is the angle between the rotations of frames f and f + 1.
   const auto jump = [&](int f) { return AngleBetween(track[f], track[f + 1]); };
   for (int f = first_frame; f + 1 < end; ++f) {
     const double angle = jump(f);
@@ -98,9 +98,9 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
   }
 }
 
-// Repairs single frames at which the root leaves its path. The solver of the recording sometimes
-// attributes its motion to another joint (16_17: pelvis moved 4 cm and turned 30 degrees for a
-// frame).
+// Repairs single frames in which the root leaves its path. The motion capture software sometimes
+// attributes motion of the root to another joint (16_17: for one frame, the pelvis moves by 4 cm
+// and turns by 30 degrees).
 void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
   std::vector<Vec3>& path = clip.root_positions_m;
   const int end = clip.frame_count();
@@ -119,8 +119,8 @@ void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
     }
     off[static_cast<std::size_t>(f)] = glm::length(path[static_cast<std::size_t>(f)] - median);
   }
-  // In a fast walk the root moves 2 cm per frame at 120 Hz, but the median moves by the same
-  // amount.
+  // In a fast walk, the root moves by 2 cm per frame at 120 Hz. The median moves by the same
+  // amount, so the distance between them is small.
   for (int f = first_frame + 1; f + 1 < end; ++f) {
     if (off[static_cast<std::size_t>(f)] <= limit) continue;
     int last = f;

@@ -9,13 +9,13 @@
 
 namespace stridewire {
 
-/// A joint that rotated, or a root that moved, faster than a human body can.
+/// A joint that rotates, or a root that moves, faster than a human body can.
 struct JointFlip {
   int joint = 0;
   /// The replaced frames, or the frames around a jump that was not repaired.
   FrameRange frames;
   double angle_rad = 0.0;  ///< Largest rotation between two successive frames; 0 for the root path.
-  double distance_m = 0.0;  ///< Largest distance of the root from its path.
+  double distance_m = 0.0;  ///< Largest distance of the root from its smoothed path.
 };
 
 struct GlitchReport {
@@ -26,15 +26,15 @@ struct GlitchReport {
 
 /// Repairs capture glitches of a few frames in place. Frames before `first_frame` are ignored.
 ///
-/// - A joint that jumps (more than 1800 degrees/s between frames) and returns within 40 ms is
-///   interpolated over the bad frames by slerp.
+/// - A joint jumps if it rotates by more than 1800 degrees/s between frames. If it returns within
+///   40 ms, the frames in between are interpolated by slerp.
 /// - If a joint jumps within 40 ms of either end of the recording, the nearest good frame replaces
 ///   the frames beyond the jump.
-/// - A jump without return is spread over 80 ms if it is at most 45 degrees, or if less than 15 cm
-///   of the body are beyond the joint. Fingers, thumbs and toes flip by up to 180 degrees.
+/// - A jump without return is spread over 80 ms if it is at most 45 degrees, or if the body extends
+///   less than 15 cm beyond the joint. Fingers, thumbs and toes flip by up to 180 degrees.
 /// - Other jumps remain and are reported.
-/// - The root is interpolated where it deviates from its path, the median over five frames. The
-///   limit is 1 cm, or the distance that 40 m/s^2 covers in one frame if that is larger.
+/// - The root is interpolated where it deviates too far from the median over five frames. The limit
+///   is 1 cm or, if larger, the distance that 40 m/s^2 covers in one frame.
 GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& clip);
 
 /// Returns a description such as "LeftArm turns 94 degrees in one frame at 0.02 s".

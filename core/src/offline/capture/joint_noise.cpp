@@ -10,19 +10,21 @@ namespace {
 
 constexpr double kLimbEndM = 0.15;
 
-// A filter for noisy joint rotations: a median, then a Gaussian mean cut off at two deviations.
+// A filter for noisy joint rotations: a median followed by a Gaussian mean, whose window ends at
+// two standard deviations.
 struct NoiseFilter {
-  double least_rad_s2;    // Joints with smaller angular accelerations are not filtered.
-  double median_reach_s;  // Half of the window of the median.
-  double deviation_s;     // Standard deviation of the weights of the mean.
+  // The filter applies only to joints with at least this angular acceleration.
+  double least_rad_s2;
+  double median_reach_s;  // Half the length of the median's window.
+  double deviation_s;     // Standard deviation of the Gaussian.
 };
 constexpr NoiseFilter kLimbEndFilter = {1000.0, 1.0 / 30, 0.025};
 constexpr NoiseFilter kAnkleFilter = {2000.0, 0.0, 0.010};
 constexpr double kAccelerationPercentile = 0.99;
-// Largest number of samples of a window on each side of its frame.
+// Maximum number of samples before, and also after, the centre of a window.
 constexpr int kMaxReachSamples = 8;
 
-// Returns the length of the body beyond a joint.
+// Returns how far the body extends beyond a joint.
 double ReachBeyond(const Skeleton& skeleton, int joint) {
   std::vector<double> distance(skeleton.joints.size(), -1.0);
   distance[static_cast<std::size_t>(joint)] = 0.0;
@@ -47,8 +49,8 @@ bool IsAnkle(const Skeleton& skeleton, int joint) {
 // The rotations of a joint in successive frames.
 using RotationTrack = std::vector<Quat>;
 
-// [frame][k - 1]: angle between the rotations of a frame and of the k-th sample after it. Windows
-// overlap, so each angle belongs to many of them.
+// [frame][k - 1]: angle between the rotation of a frame and that of the k-th sample after it.
+// Angles are stored because overlapping windows use them many times.
 using PairAngles = std::vector<std::array<double, 2 * kMaxReachSamples>>;
 
 PairAngles AnglesOf(const RotationTrack& track, int stride) {
@@ -64,8 +66,8 @@ PairAngles AnglesOf(const RotationTrack& track, int stride) {
   return angles;
 }
 
-// The rotations of a track that are at most `reach` frames before or after a frame, or every n-th
-// of them. The number of samples is limited, because the median compares all pairs.
+// A window on a track: the rotations at most `reach` frames from a central frame. Long windows
+// contain only every n-th rotation, because the median compares all pairs.
 class Window {
  public:
   Window(const RotationTrack& track, int frame, int reach)

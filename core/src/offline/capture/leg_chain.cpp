@@ -13,12 +13,14 @@ namespace stridewire {
 namespace {
 
 constexpr double kRadPerDegree = std::numbers::pi / 180.0;
-// A joint divides a chain into segments if it bends the chain by more than this angle: a share of
-// the largest bend of the chain within these limits. Twist joints do not bend it.
+// A joint separates two segments of a chain if it bends the chain by more than a limit. The limit
+// is this fraction of the chain's largest bend, clamped to the following range. Twist joints do not
+// bend a chain, so they never separate segments.
 constexpr double kBendShare = 0.3;
 constexpr double kLeastBendRad = 2.0 * kRadPerDegree;
 constexpr double kMostBendRad = 10.0 * kRadPerDegree;
-// A longer segment, as a share of the chain, contains thigh and shin of a leg that stays straight.
+// A segment longer than this fraction of the chain contains both thigh and shin of a leg that stays
+// straight.
 constexpr double kLongestSegmentShare = 0.6;
 
 LegPart PartOf(const FigureShape& figure, int j) {
@@ -29,8 +31,8 @@ bool IsHelper(const FigureShape& figure, int j) {
   return IsHelperName(figure.joints[Index(j)].name);
 }
 
-// The joints of a chain at different places. Of joints at the same place it keeps the one that a
-// name identifies, or else the lowest one.
+// The joints of a chain without coincident ones. Of several joints at the same place, the chain
+// contains the one that a name identifies, or else the lowest one.
 class Chain {
  public:
   Chain(const FigureShape& figure, const std::vector<int>& joints) : figure_(figure) {
@@ -50,10 +52,10 @@ class Chain {
   }
 
   [[nodiscard]] const std::vector<int>& nodes() const { return nodes_; }
-  // Indices of the nodes that divide the chain into segments, with its first and last node.
+  // Indices of the nodes that separate the segments, including the first and the last node.
   [[nodiscard]] const std::vector<std::size_t>& ends() const { return ends_; }
 
-  // Returns the length of the segments above and below end `k`.
+  // Returns the total length of the segments above and below end `k`.
   [[nodiscard]] double LengthAround(std::size_t k) const {
     return starts_[ends_[k + 1]] - starts_[ends_[k - 1]];
   }
@@ -63,7 +65,7 @@ class Chain {
     return glm::length(DVec3(figure_.joints[Index(j)].offset_m));
   }
 
-  // Returns the angle that 95 % of the poses do not exceed between the bones at node `i`.
+  // Returns the 95th percentile over all poses of the angle between the bones at node `i`.
   [[nodiscard]] double Bend(std::size_t i) const {
     std::vector<double> angles;
     const auto add = [&](const std::vector<DVec3>& pose) {
@@ -116,8 +118,8 @@ class Chain {
 };
 
 // Finds the toe joint below an ankle: the nearest joint with a matching name, or else the only
-// child if its bone has a length. Joints are sorted parents first, so the first match is a nearest
-// one.
+// child if its bone is not of zero length. Parents precede their children, so the first match is
+// one of the nearest.
 int FindBall(const std::vector<Joint>& joints, int ankle) {
   int only = -1;
   int children = 0;
@@ -152,7 +154,7 @@ FoundLeg FindLegAboveAnkle(const FigureShape& figure, const std::vector<int>& jo
   FoundLeg leg{joints[0], joints[1], ankle, FindBall(figure.joints, ankle)};
   const Chain chain(figure, joints);
   const std::vector<int>& nodes = chain.nodes();
-  if (nodes.size() < 3) return leg;  // No other joint can be the knee.
+  if (nodes.size() < 3) return leg;  // With fewer nodes, no other joint can be the knee.
   const std::size_t last = nodes.size() - 1;
   const bool is_named = std::any_of(nodes.begin() + 1, nodes.end() - 1,
                                     [&](int j) { return PartOf(figure, j) == LegPart::kKnee; });
@@ -171,8 +173,8 @@ FoundLeg FindLegAboveAnkle(const FigureShape& figure, const std::vector<int>& jo
     if (may_be_knee(i)) knee = i;
   }
   if (knee == 0) knee = 1;
-  // The thigh may consist of several joints in a line. Its upper end is the first one of them that
-  // has a name of the leg.
+  // The thigh may consist of several collinear joints. Its upper end is the first of them whose
+  // name belongs to the leg.
   std::size_t thigh = 0;
   for (const std::size_t end : chain.ends()) {
     if (end < knee) thigh = end;

@@ -14,16 +14,18 @@
 namespace stridewire {
 namespace {
 
-// Lengths of limbs of a pair differ by at most this share.
+// The lengths of a pair of limbs differ by at most this fraction.
 constexpr double kPairTolerance = 0.08;
-// The ends of legs may be this share of their length above the lowest point of the figure.
+// The ends of the legs may be above the lowest point of the figure, by at most this fraction of the
+// leg length.
 constexpr double kFloorShare = 0.15;
-// Legs point down if the sum of both leg vectors is at least this share of their lengths.
+// Legs point down if the vectors from the hips to the ends of the legs have a mean downward
+// component of at least this fraction of the leg length.
 constexpr double kPointsDownShare = 0.3;
-// Another limb this long, as a share of the legs, can be a further leg.
+// Another limb is a candidate for a further leg if it has at least this fraction of the leg length.
 constexpr double kOtherLegShare = 0.5;
 constexpr double kStandsShare = 0.8;
-// A trunk that rises less than this share of its length is horizontal.
+// A trunk is horizontal if its height difference is less than this fraction of its length.
 constexpr double kHorizontalShare = 0.5;
 constexpr double kMostPoses = 0.9;
 
@@ -99,15 +101,15 @@ bool HasNameOutsideLegs(const FigureShape& figure, const LimbPair& pair) {
   return false;
 }
 
-// Returns the lowest height of a chain in direction `up`.
+// Returns the lowest height of the joints of a chain. `up` is the up direction.
 double LowestOf(const Pose& pose, const std::vector<int>& chain, const DVec3& up) {
   double lowest = INFINITY;
   for (const int j : chain) lowest = std::min(lowest, glm::dot(pose[Index(j)], up));
   return lowest;
 }
 
-// Returns the axis that points from the ends of the legs up to the hips. Empty if the legs do not
-// carry the body: they do not point down, or other joints are lower than their ends in most poses.
+// Returns the axis from the ends of the legs up to the hips. Returns nullopt if the legs do not
+// carry the body: they do not point down, or in most poses other joints are lower than their ends.
 std::optional<DVec3> CarryingDirection(const FigureShape& figure, std::span<const Pose> poses,
                                        const LimbPair& pair) {
   DVec3 sum(0.0);
@@ -138,8 +140,8 @@ std::optional<DVec3> CarryingDirection(const FigureShape& figure, std::span<cons
   return up;
 }
 
-// Returns true if the ends of `other` are as low as those of `legs`: in the rest pose if the figure
-// stands in it, else in most poses of the motion.
+// Returns true if the ends of `other` are as low as those of `legs`. Compares them in the rest pose
+// if the figure stands in it, and otherwise in most poses of the motion.
 bool ReachesTheGround(const FigureShape& figure, const LimbPair& legs, const LimbPair& other,
                       const DVec3& up) {
   const auto reaches = [&](const Pose& pose) {
@@ -188,7 +190,7 @@ Expected<FoundLegs> FindLegsByShape(const FigureShape& figure) {
     if (HasNameOutsideLegs(figure, pair)) continue;
     std::optional<DVec3> direction = CarryingDirection(figure, PosesOf(figure), pair);
     // If the legs do not carry the figure in the motion, for example because it hangs by its arms,
-    // the rest pose decides.
+    // the rest pose determines the direction.
     if (!direction) direction = CarryingDirection(figure, std::span(&figure.rest, 1), pair);
     if (!direction) continue;
     best = &pair;
@@ -207,8 +209,8 @@ Expected<FoundLegs> FindLegsByShape(const FigureShape& figure) {
   FoundLegs legs;
   legs.by_shape = true;
   legs.root = figure.joints[Index(best->chains[0].front())].parent;
-  // Number of joint names that identify the first chain as the left one, minus the number of names
-  // that contradict this.
+  // Votes of the joint names: +1 if a name identifies the first chain as the left one, -1 if it
+  // contradicts this.
   int votes = 0;
   for (int side = 0; side < 2; ++side) {
     legs.legs[side] = FindLegInChain(figure, best->chains[side]);
@@ -231,7 +233,7 @@ std::vector<int> NamedAnkles(const FigureShape& figure, Side side) {
   return ankles;
 }
 
-// Returns true if a joint above `ankle` has a name of the thigh or of the shin.
+// Returns true if the name of a joint above `ankle` identifies a thigh or shin.
 bool HasNamedLeg(const FigureShape& figure, int ankle) {
   for (int j = figure.joints[Index(ankle)].parent; j >= 0; j = figure.joints[Index(j)].parent) {
     const LegPart part = ReadLegName(figure.joints[Index(j)].name).part;
@@ -257,8 +259,8 @@ bool FindLegsByName(const FigureShape& figure, FoundLegs& legs) {
   return found;
 }
 
-// Returns true if names identify a further leg at another place than the legs in `legs`. Rigs may
-// contain copies of the same leg, which do not count as further legs.
+// Returns true if joint names identify a further leg that is not at the same place as one of
+// `legs`. Rigs may contain copies of a leg, which do not count.
 bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
   const Pose& pose = PosesOf(figure).front();
   for (const Side side : {Side::kLeft, Side::kRight}) {
@@ -266,7 +268,7 @@ bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
     const double length = ChainLength(figure.joints, leg.hip, leg.ankle);
     for (const int ankle : NamedAnkles(figure, side)) {
       if (IsBelow(figure.joints, ankle, leg.hip) || !HasNamedLeg(figure, ankle)) continue;
-      int top = ankle;  // The upper end of the thigh or shin of this leg.
+      int top = ankle;  // The uppermost thigh or shin joint of this leg.
       for (int j = ankle; j >= 0; j = figure.joints[Index(j)].parent) {
         const LegPart part = ReadLegName(figure.joints[Index(j)].name).part;
         if (part == LegPart::kKnee || part == LegPart::kHip) top = j;
@@ -282,9 +284,10 @@ bool HasFurtherNamedLeg(const FigureShape& figure, const FoundLegs& legs) {
   return false;
 }
 
-// Returns true if the hands are on the ground like the feet while the trunk is horizontal: in the
-// rest pose if the figure stands in it, else in most poses of the motion. In the rest pose of rigs
-// whose bones are all parallel, the figure does not stand: its trunk points down like its legs.
+// Returns true if the hands are on the ground like the feet and the trunk is horizontal. Checks the
+// rest pose if the figure stands in it, and otherwise most poses of the motion. In rigs whose bones
+// are all parallel at rest, the figure does not stand in the rest pose, because trunk and legs
+// point down.
 bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
   int hands[2] = {-1, -1};
   for (int j = 0; j < static_cast<int>(figure.joints.size()); ++j) {
@@ -303,7 +306,7 @@ bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
     for (const FoundLeg& leg : legs.legs) sum += pose[Index(leg.hip)] - pose[Index(leg.ankle)];
     return sum;
   };
-  // The trunk ends where the arms begin, at most at the height of the neck.
+  // The trunk ends where the arms begin, at most at the neck.
   const auto trunk_of = [&](const Pose& pose) {
     DVec3 trunk(0.0);
     for (const int hand : hands) {

@@ -39,15 +39,16 @@ struct FoundLegs {
 
 /// Finds the other joints of both legs from their ankles, indexed by Foot. The knee and the hip are
 /// joints with matching names, or else the joints that divide the chain above the ankle into two
-/// long segments. A twist joint, which never bends the leg, does not end a segment. Returns false
-/// if the ankles do not belong to two legs. If `side` is not null, it receives the leg at fault.
+/// long segments. A twist joint never bends the leg, so it does not end a segment. Returns false if
+/// the ankles do not belong to two legs. If `side` is not null, it receives the leg that was not
+/// found.
 [[nodiscard]] bool FindLegsAbove(const FigureShape& figure, const int (&ankles)[2], FoundLegs& legs,
                                  int* side = nullptr);
 
-/// Detects both legs by joint names, and otherwise by shape: two chains of the same joint with
-/// equal lengths (within 8 %) whose ends are below the rest of the body in the motion, or in the
-/// rest pose if there is no motion. Of several pairs it takes the one nearest to the root, and then
-/// the longest.
+/// Detects both legs by joint names or, if these do not identify them, by shape. By shape, legs are
+/// two chains that start at the same joint and have equal lengths (within 8 %). Their ends are
+/// below the rest of the body, in the motion or, if there is none, in the rest pose. If there are
+/// several pairs, the pair nearest to the root is chosen, and then the longest one.
 ///
 /// Errors: kUnsupported if a leg is missing, if there is no pair of legs, or if the figure walks on
 /// more than two legs.

@@ -78,10 +78,11 @@ LegPart PartOf(std::string_view word) {
   return LegPart::kNone;
 }
 
-// The parts of leg names have at most two words, such as "upper leg".
+// Maximum number of words in the name of a leg part, for example "upper leg".
 constexpr std::size_t kMostWords = 2;
 
-// Reads the part at the end of `words`. Longer parts come first: "up leg" is not a "leg".
+// Reads the leg part at the end of `words`. Longer names come first, because "up leg" ends with
+// "leg" but is another part.
 LegPart PartAtEnd(const Words& words) {
   for (std::size_t count = std::min(kMostWords, words.size()); count > 0; --count) {
     std::string joined;
@@ -95,7 +96,7 @@ bool AnyWord(std::string_view name, bool (*test)(std::string_view)) {
   return std::ranges::any_of(SplitWords(name), [&](const std::string& word) { return test(word); });
 }
 
-// Reads names whose side is not a word of its own: "lfemur", "leftfoot", "footright".
+// Reads names that are joined with their side: "lfemur", "leftfoot", "footright".
 LegName ReadJoinedName(Words words) {
   if (words.empty()) return {};
   const std::string last = words.back();
@@ -125,7 +126,8 @@ LegName ReadLegName(std::string_view name) {
   for (std::string& word : SplitWords(name)) {
     if (IsHelper(word) || IsOutsideLegs(word)) return {};
     if (const Side found = SideOf(word); found != Side::kNone) {
-      side = found;  // A prefix may look like a side; the last word decides.
+      // If several words match a side, the last one decides, because prefixes may look like a side.
+      side = found;
     } else if (!IsFiller(word)) {
       rest.push_back(std::move(word));
     }

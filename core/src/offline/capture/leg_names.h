@@ -12,13 +12,13 @@ struct LegName {
   LegPart part = LegPart::kNone;
 };
 
-/// Derives side and part of the leg from the end of a joint name, so that a prefix does not matter:
+/// Derives side and part of the leg from the end of a joint name. Prefixes are ignored:
 /// "LeftUpLeg", "mixamorig_LeftUpLeg", "J_Bip_L_Foot", "Bip01 L Thigh", "calf_l", "KneeRight",
 /// "lfemur". "LeftHip" is the upper end of the thigh. Names of helper joints (twist, roll, IK) and
-/// of tips have no part. A name has a part only if it also has a side.
+/// of tips have no part. A name without a side has no part either.
 [[nodiscard]] LegName ReadLegName(std::string_view name);
 
-/// Returns the side that any joint name contains as a word of its own: "LeftHand", "eye.R".
+/// Returns the side that a joint name contains as a separate word: "LeftHand", "eye.R".
 [[nodiscard]] Side ReadSide(std::string_view name);
 
 /// Returns true for names of helper joints of a rig: twist and roll bones, IK targets and tips.
