@@ -13,16 +13,16 @@ using builtin::kDegree;
 constexpr double kWalkTurnRad = 40.0 * kDegree;
 constexpr double kSpotTurnRad = 60.0 * kDegree;
 
-// The following lengths suit a person whose legs have the length kReferenceLegM, and are scaled
-// with the legs.
+// The following lengths are for a person whose legs have the length kReferenceLegM. They are scaled
+// with the length of the legs.
 constexpr double kReferenceLegM = 0.86;
 constexpr double kSideStepM = 0.3;        // Additional width of a side step.
 constexpr double kDiagonalLengthM = 0.4;  // Forward distance between the feet in diagonal steps.
-// Sideways distance between the feet after a turn outward.
+// Sideways distance between the feet after a turn towards the moving foot.
 constexpr double kWidthAfterTurnM = 0.26;
 constexpr std::array kBackwardLengthsM = {0.0, 0.2, 0.4};
 
-// Sideways distances of the feet are at least these, whatever the captures contain.
+// Minimum sideways distances of the feet. They apply even if captured distances are smaller.
 constexpr double kMinStrideWidthM = 0.06;
 constexpr double kMinSideStepWidthM = 0.1;
 
@@ -54,23 +54,23 @@ class BasicStepList {
   [[nodiscard]] double stand_width() const {
     return SideSign(foot_) * person_.StandVector(foot_).x;
   }
-  // Forward distance between the feet in the middle of double support of the captured strides.
+  // Forward distance between the feet in the middle of double support, as in the captured strides.
   [[nodiscard]] double full() const {
     return 0.5 * (stride().start_length_m + stride().end_length_m);
   }
-  // Returns the sideways distance between the feet if one is `length_m` ahead of the other. The
-  // longer the step, the closer it is to that of the captured strides.
+  // Returns the sideways distance between the feet if one is `length_m` ahead of the other. It
+  // changes from that of the stand pose to that of the captured strides as the length increases.
   [[nodiscard]] double Width(double length_m) const {
     const double share = std::min(1.0, length_m / full());
     return stand_width() + share * (std::max(stride().width_m, kMinStrideWidthM) - stand_width());
   }
-  // Returns which part of the forward distance between the feet in the stand pose remains in a
-  // step.
+  // Returns the fraction of the forward distance between the feet in the stand pose that remains in
+  // a step of this length.
   [[nodiscard]] double StandOffset(double length_m) const {
     return person_.StandVector(foot_).z * (1.0 - std::min(1.0, length_m / full()));
   }
-  // Return the vector from the fixed to the moving foot, which is `length_m` behind the fixed foot
-  // at the start of a step and `length_m` ahead of it at the end.
+  // These functions return the vector from the fixed to the moving foot. The moving foot is
+  // `length_m` behind the fixed foot at the start of a step, and `length_m` ahead of it at the end.
   [[nodiscard]] DVec3 Start(double length_m, double width_m) const {
     return {SideSign(foot_) * width_m, 0.0, StandOffset(length_m) - length_m};
   }
@@ -108,7 +108,7 @@ class BasicStepList {
     for (const double start_m : kBackwardLengthsM) {
       for (const double end_m : kBackwardLengthsM) {
         if (start_m == 0.0 && end_m == 0.0) continue;
-        // The moving foot is in front at the start and behind at the end.
+        // In steps backward, the moving foot is in front at the start and behind at the end.
         StepFeet feet;
         feet.start_m = End(scale_ * start_m, Width(scale_ * start_m));
         feet.end_m = Start(scale_ * end_m, Width(scale_ * end_m));
@@ -130,7 +130,8 @@ class BasicStepList {
         Add("", Feet(start_m, end_m));
         for (const double side : {1.0, -1.0}) {
           StepFeet feet = Feet(start_m, end_m, side * turn_rad);
-          // If the foot turns outward and lands beside the other one, it must not touch its heel.
+          // If the foot turns outward and lands beside the other foot, it needs room for that
+          // foot's heel.
           if (end_m == 0.0 && side > 0.0) feet.end_m.x = SideSign(foot_) * wide_m;
           AddWithDirection(on_the_spot ? "turns on the spot" : "turns while walking", side > 0.0,
                            feet);
@@ -140,7 +141,7 @@ class BasicStepList {
     for (const double side : {0.0, 1.0, -1.0}) {
       Add("", Feet(0.5 * full(), 0.5 * full(), side * kWalkTurnRad));
     }
-    // Steps that continue after an outward turn, or from feet wider apart than in a walk.
+    // These steps follow an outward turn, or start with the feet wider apart than in a walk.
     for (const double turn_rad : {0.0, kSpotTurnRad, -kSpotTurnRad}) {
       StepFeet feet = Feet(0.0, 0.0, turn_rad);
       feet.start_m.x = SideSign(foot_) * wide_m;

@@ -25,10 +25,10 @@ using complete::BasicStepGroup;
 using complete::Person;
 using complete::StrideModel;
 
-// Soles of stands are less tilted than this.
+// Maximum tilt of the soles in a stand.
 constexpr double kMaxTiltM = 0.02;
 
-// Collects the names of steps that are missing in the captures, on one side or on both.
+// Collects the names of steps that the captures lack, on one side or on both.
 class LackingList {
  public:
   void Add(const BasicStep& step, Foot foot) {
@@ -58,12 +58,13 @@ class LackingList {
   struct Entry {
     std::string name;
     bool has_direction = false;
-    std::array<bool, 2> sides{};  // True if the step to the left, or to the right, is missing.
+    std::array<bool, 2> sides{};  // {left, right}: true if the step on this side is missing.
   };
   std::vector<Entry> entries_;
 };
 
-// Returns the foot that moves in all steps of a library, or nothing if both move or none does.
+// Returns the foot that moves in all steps of a library. Returns nullopt if both feet move in
+// steps, or none does.
 std::optional<Foot> OnlyFootOf(const RawLibrary& library) {
   std::array<bool, 2> moves{};
   for (const RawGroup& group : library.groups) {
@@ -97,8 +98,8 @@ std::string SourceOf(const BasicStep& step) {
   return text;
 }
 
-// Measures the person in the captures. If these contain no stand, composes the stand pose of the
-// library. Returns nullopt and sets `completion.failure` if no steps can be generated.
+// Measures the person in the captures. If they contain no stand, also composes the stand pose of
+// the library. Returns nullopt and sets `completion.failure` if no steps can be generated.
 std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion) {
   std::optional<StrideModel> left = complete::MeasureStride(library, Foot::kLeft);
   std::optional<StrideModel> right = complete::MeasureStride(library, Foot::kRight);

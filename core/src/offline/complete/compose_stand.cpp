@@ -11,9 +11,9 @@
 namespace stridewire::complete {
 namespace {
 
-// A captured pose is a stand if it is within these limits: distances of the feet in each direction,
-// bend of the knees, and difference of their bends. In captured stands people bend their knees by
-// up to 36 degrees, with less than 10 degrees between them. The limits are wider, because some
+// Limits within which a captured pose is a stand: distances between the feet in each direction, the
+// bend of each knee, and the difference between both bends. In captured stands, people bend their
+// knees by up to 36 degrees, with a difference below 10 degrees. The limits are wider, because some
 // captured characters crouch all the time.
 constexpr double kMaxFeetAheadM = 0.12;
 constexpr double kMaxFeetRiseM = 0.04;
@@ -30,7 +30,7 @@ constexpr double kHipsAheadM = 0.03;  // The hips are this far ahead of the ankl
 // Generic time at which the sole of the fixed foot is flat, because the other foot swings past it.
 constexpr double kFlatSoleTime = 1.3;
 
-// Returns the bend of a knee: 0 if the leg is straight.
+// Returns the bend of a knee, which is 0 if the leg is straight.
 double KneeRad(const LegRig::Side& side, const LegPose& leg) {
   const auto at = [&](int joint) {
     return DVec3(leg.positions_m[static_cast<std::size_t>(joint)]);
@@ -40,8 +40,8 @@ double KneeRad(const LegRig::Side& side, const LegPose& leg) {
   return Acos(glm::dot(thigh, shank) / std::sqrt(glm::dot(thigh, thigh) * glm::dot(shank, shank)));
 }
 
-// Averages the postures of steps, and the feet while their soles are flat. The width of the stand
-// stays 0.
+// Averages the postures of steps, and their feet while the soles are flat. Does not set
+// StandParts::width_m.
 class StandAverage {
  public:
   void AddPosture(const PostureSample& sample) {
@@ -147,7 +147,7 @@ std::optional<StandParts> MeasureStandParts(const RawLibrary& library) {
       if (point == kPointsPerInterval * 3 / 2) average.AddSole(fixed, sample);
     });
   }
-  // If all steps are of the same foot, its sole is flat only after it has landed.
+  // If the same foot moves in all steps, its sole is flat only after it has landed.
   for (const RawGroup& group : library.groups) {
     if (!IsCapturedStep(group) || average.has_sole(MovingFoot(group.kind))) continue;
     ForEachSample(library.skeleton, group, [&](std::size_t point, const PostureSample& sample) {

@@ -15,24 +15,24 @@ namespace stridewire::complete {
 [[nodiscard]] std::optional<std::string> WhyNoStand(const Skeleton& skeleton, const LegRig& rig,
                                                     const Pose& pose);
 
-/// Measurements of a walk from which a stand pose is composed.
+/// Parts of a stand pose, as measured in a walk.
 struct StandParts {
-  PostureSample mean;                ///< Mean posture; its root and feet are not used.
+  PostureSample mean;                ///< Mean posture. Its root and feet are not used.
   std::array<DQuat, 2> ankles;       ///< [Foot]: rotation of the ankle while the sole is flat.
   std::array<double, 2> ball_y_m{};  ///< [Foot]: height of the ball while the sole is flat.
   double width_m = 0.0;              ///< Sideways distance between the feet.
 };
 
-/// Measures a StandParts in the mean strides of both feet. Over both strides, the swings of arms
-/// and pelvis cancel out. The soles are flat in the middle of single support.
+/// Measures the parts of a stand in the mean strides of both feet. The average over both strides
+/// cancels the swings of arms and pelvis. The sole of the fixed foot is flat in the middle of
+/// single support.
 [[nodiscard]] StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides);
 
-/// Measures a StandParts in all captured steps of a library, for libraries without level strides
-/// straight ahead. Returns nullopt if the steps do not show the soles of both feet flat on the
-/// ground.
+/// Measures the parts of a stand in all captured steps, for libraries without level, straight
+/// strides. Returns nullopt if the sole of either foot is never flat on the ground.
 [[nodiscard]] std::optional<StandParts> MeasureStandParts(const RawLibrary& library);
 
-/// Composes a stand pose with the feet side by side and nearly straight knees.
+/// Composes a stand pose, with the feet side by side and the knees nearly straight.
 [[nodiscard]] Pose ComposeStand(const Skeleton& skeleton, const LegRig& rig,
                                 const StandParts& parts);
 

@@ -12,7 +12,7 @@
 namespace stridewire::complete {
 namespace {
 
-// Steps that are this close to the captured ones count as captured.
+// A step this close to the captured ones counts as captured.
 constexpr double kCloseM = 0.06;
 // Sideways tolerance of groups without sideways parameters.
 constexpr double kSideSlackM = 0.12;

@@ -11,9 +11,10 @@
 namespace stridewire::complete {
 namespace {
 
-constexpr double kStrideLengthM = 0.55;  // For a person with the legs of the generated figure.
+// Stride length for the leg length of the generated figure.
+constexpr double kStrideLengthM = 0.55;
 constexpr double kArmSwingRad = 0.2;
-// Upper arms are at least this long. Collar bones and shoulder blades are shorter.
+// Minimum length of an upper arm. Collar bones and shoulder blades are shorter.
 constexpr float kUpperArmM = 0.15f;
 
 struct UpperArm {
@@ -41,7 +42,7 @@ std::vector<UpperArm> FindUpperArms(const Skeleton& skeleton, const Pose& stand)
   return arms;
 }
 
-// Turns an arm about the sideways axis of the body. Positive angles move it forward.
+// Rotates an arm about the sideways axis of the body. Positive angles move it forward.
 void SwingArm(const Skeleton& skeleton, const UpperArm& arm, double forward_rad,
               PostureSample& sample) {
   DQuat above(1.0, 0.0, 0.0, 0.0);
@@ -59,13 +60,14 @@ PostureSample StandOfFigure(const Skeleton& figure) {
   return SampleOf(figure, pose, 0.0);
 }
 
-// Returns the root of a sample relative to the middle between the balls of the feet.
+// Returns the root of a sample relative to the midpoint between the balls of the feet.
 DVec3 RootFromBalls(const PostureSample& sample) {
   return sample.root_m - 0.5 * (sample.balls_m[0] + sample.balls_m[1]);
 }
 
-// Poses a person like the generated figure: pelvis and feet deviate from the stand pose of the
-// person as those of the figure deviate from its own, scaled with the legs.
+// Transfers poses of the generated figure to a person. Pelvis and feet of the person deviate from
+// the person's stand pose as those of the figure deviate from its own stand pose. The deviations
+// are scaled with the length of the legs.
 class PoseTransfer {
  public:
   PoseTransfer(const Skeleton& figure, const PostureSample& stand, double scale)

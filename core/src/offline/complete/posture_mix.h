@@ -9,31 +9,31 @@
 
 namespace stridewire::complete {
 
-/// A pose in double precision, and the places of its feet for inverse kinematics. World rotations
-/// are relative to the heading.
+/// A pose in double precision, with the positions of its feet for inverse kinematics. World
+/// rotations are relative to the heading.
 struct PostureSample {
   DVec3 root_m = DVec3(0.0);
-  /// [joint]: rotation relative to the parent; that of the root is relative to the heading.
+  /// [joint]: rotation relative to the parent or, for the root, to the heading.
   std::vector<DQuat> rotations;
   std::array<DQuat, 2> ankles;                           ///< [Foot]: world rotation of the ankle.
   std::array<DVec3, 2> balls_m{DVec3(0.0), DVec3(0.0)};  ///< [Foot]: position of the ball.
 };
 
 /// Returns the normalised linear blend of two rotations along the shorter arc. It uses only
-/// correctly rounded operations, so the result has the same bits on every machine. If both
-/// rotations are multiplied by a constant rotation on either side, so is the result. The blend
-/// therefore does not depend on the axes of joints.
+/// correctly rounded operations, so the result has the same bits on every machine. It does not
+/// depend on the axes of joints: if both rotations are multiplied by a constant rotation, the
+/// result is multiplied by it as well.
 [[nodiscard]] DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b);
 
-/// Returns a + share (b - a) of every part of two samples.
+/// Returns a + share (b - a) for every member of two samples.
 [[nodiscard]] PostureSample Blend(const PostureSample& a, const PostureSample& b,
                                   double share_of_b);
 
-/// Measures the feet of a pose. `pose` has the heading `heading_rad`.
+/// Converts a pose with the heading `heading_rad` to a sample, and measures its feet.
 [[nodiscard]] PostureSample SampleOf(const Skeleton& skeleton, ConstPoseSpan pose,
                                      double heading_rad);
 
-/// Returns the position of the root relative to the ground in the middle between the balls.
+/// Returns the position of the root relative to the ground below the midpoint between the balls.
 [[nodiscard]] DVec3 RootFromFeet(const PostureSample& sample);
 
 /// Converts to a pose in single precision.

@@ -18,40 +18,40 @@ namespace {
 
 constexpr double kFps = 120.0;
 
-// Steps from a stand begin with a shift of the weight, which takes time because the body has no
-// momentum. Steps to a stand end with settling.
+// Steps that start in a stand begin with a weight shift, which takes time because the body has no
+// momentum. Steps that end in a stand end with settling.
 constexpr double kWeightShiftS = 0.28;
 constexpr double kSettleS = 0.24;
-// The same for steps that begin and end in a stand, such as turns on the spot.
+// Duration of the weight shift for steps that begin and end in a stand, such as turns on the spot.
 constexpr double kWeightShiftInPlaceS = 0.18;
 constexpr double kSettleInPlaceS = 0.15;
 constexpr double kMinSwingS = 0.36;
 constexpr double kMaxSwingS = 0.62;
-// A step backward takes this many times as long as the same step forward.
+// A step backward takes longer than the same step forward, by this factor.
 constexpr double kBackwardSlowdown = 1.15;
 
-// Generic times between which the moving foot changes its place. It leaves the ground a little
-// before the toe-off that was detected in the captures, and rests a little after the heel-strike.
+// Generic times between which the moving foot moves to its new place. The foot leaves the ground a
+// little before the toe-off detected in the captures, and rests a little after the heel-strike.
 constexpr double kSwingBegin = 0.92;
 constexpr double kSwingEnd = 2.06;
-// In the middle of a swing, pitch and height of the foot contain at least this share of the
-// captured stride, so that the feet do not drag in short steps.
+// Minimum fraction of the captured stride in pitch and height of the foot in the middle of a swing.
+// It prevents feet from dragging in short steps.
 constexpr double kMinSwingShare = 0.45;
-// Heights of the ball and of the tip of the toes during a swing. The foot is lifted in steps of
-// kLiftStepM until it has them.
+// Minimum heights of the ball and of the toe tip during a swing. The foot is lifted in increments
+// of kLiftStepM until it reaches them.
 constexpr double kClearanceM = 0.024;
 constexpr double kTipClearanceM = 0.02;
 constexpr double kLiftStepM = 0.004;
 constexpr double kMaxLiftM = 0.12;
 constexpr builtin::DetourRange kDetours = {.max_m = 0.35, .step_m = 0.01, .clearance_m = 0.09};
 
-// Shift of the weight over the fixed foot in steps from and to a stand, as a share of the distance
-// to that foot.
+// Distance by which the weight shifts towards the fixed foot in steps from and to a stand, as a
+// fraction of the distance to that foot.
 constexpr double kSwayShare = 0.45;
-// Largest share of the captured stride. Shares above 1 extrapolate it.
+// Maximum weight of the captured stride. Weights above 1 extrapolate it.
 constexpr double kMaxShare = 1.15;
-// The distance from hip to ankle is at most this fraction of the length of the leg, unless the legs
-// are straighter in the stand pose.
+// Maximum distance from hip to ankle, as a fraction of the leg length. If the legs of the stand
+// pose are straighter, their extension is the maximum.
 constexpr double kMaxExtension = 0.996;
 
 std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
@@ -80,8 +80,9 @@ struct HermiteCurve {
   }
 };
 
-// Generates one step. What the captures and the timing determine at a moment is evaluated once, as
-// a Moment. Detour, lift and lowering of the root are then found by cheap corrections.
+// Generates one step. First, it evaluates what the captures and the timing determine, at a series
+// of times (Moment). Then it searches for the detour, the lift and the lowering of the root, which
+// are cheap corrections of these moments.
 class StepGenerator {
  public:
   StepGenerator(const Person& person, Foot moving, const StepFeet& feet)
@@ -129,7 +130,7 @@ class StepGenerator {
  private:
   struct Leg {
     DQuat ankle_rotation;       // World rotation of the foot in the step.
-    DVec3 ball_m = DVec3(0.0);  // Without detour and lift, relative to the fixed ball.
+    DVec3 ball_m = DVec3(0.0);  // Ball without detour and lift, relative to the fixed ball.
     DVec3 hip_m = DVec3(0.0);   // Relative to the root.
     DVec3 ankle_to_ball = DVec3(0.0);
     DVec3 ankle_to_tip = DVec3(0.0);
@@ -137,8 +138,8 @@ class StepGenerator {
   };
   struct Moment {
     double generic = 0.0;
-    DVec3 root_m = DVec3(0.0);  // Before it is lowered into the reach of the legs.
-    Pose posture;               // Before inverse kinematics, with the root at the origin.
+    DVec3 root_m = DVec3(0.0);  // Root before it is lowered into the reach of the legs.
+    Pose posture;               // Pose before inverse kinematics, with the root at the origin.
     std::array<Leg, 2> legs;    // [Foot]
   };
 
@@ -180,7 +181,7 @@ class StepGenerator {
   static double SwingAt(double generic) {
     return std::clamp((generic - kSwingBegin) / (kSwingEnd - kSwingBegin), 0.0, 1.0);
   }
-  // Share of the captured stride in the swinging foot.
+  // Weight of the captured stride for the swinging foot.
   [[nodiscard]] double SwingShareAt(double time_s) const {
     const double share = ShareAt(time_s);
     return share + std::max(0.0, kMinSwingShare - share) * Bump(SwingAt(GenericAt(time_s)));
@@ -250,12 +251,12 @@ class StepGenerator {
     const double captured_s = CapturedTimeAt(generic);
     DVec3 deviation = share * (stride.root_m - captured_.At(captured_s));
     const double heading = HeadingAt(time_s);
-    // The speed of the pelvis varies in proportion to the speed of the walk.
+    // The speed of the pelvis oscillates in proportion to the walking speed.
     const double usual_m_s = share * captured_.VelocityAt(captured_s).z;
     const double speed_m_s = RotateYaw(-heading, root_.VelocityAt(time_s)).z;
     if (usual_m_s > 0.0) deviation.z *= std::clamp(speed_m_s / usual_m_s, 0.0, 1.0);
     // The ball of the fixed foot is the origin, and the root is midway between the feet. In
-    // strides, momentum carries the body, so that less weight has to shift.
+    // strides, momentum carries the body, so the weight shifts less.
     const double to_fixed_m = -0.5 * (feet_.start_m.x + feet_.end_m.x) * 0.5;
     const DVec3 sway(kSwayShare * (1.0 - share) * to_fixed_m * Bump(time_s / end_s_), 0.0, 0.0);
     return root_.At(time_s) + RotateYaw(heading, deviation + sway);
@@ -297,11 +298,12 @@ class StepGenerator {
            Blend(person_.stand.ankles[f], stride.ankles[f], std::min(1.0, share));
   }
 
-  // Rotations of all joints before inverse kinematics, with the root at the origin.
+  // Computes the pose before inverse kinematics, with the root at the origin.
   [[nodiscard]] Pose PostureAt(double time_s, const PostureSample& stride) const {
     const double share = std::min(1.0, ShareAt(time_s));
     PostureSample sample = Blend(person_.stand, stride, share);
-    // The legs get more of the captured swing, so that they bend in the plane of the capture.
+    // The legs use a larger weight of the captured swing, so that they bend in the plane of the
+    // capture.
     const double leg_share = std::min(1.0, SwingShareAt(time_s));
     for (const int joint : person_.rig.side(moving_).chain) {
       const auto j = static_cast<std::size_t>(joint);
@@ -311,7 +313,7 @@ class StepGenerator {
     const double heading = HeadingAt(time_s);
     const DQuat root = DQuat(YawRotation(heading)) * sample.rotations[0];
     sample.rotations[0] = root;
-    // While a foot is turned relative to the body, the leg turns half as far.
+    // If a foot is turned relative to the body, its leg turns by half the angle.
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const double half = 0.5 * (FootYawAt(foot, time_s) - heading);
       const auto& side = person_.rig.side(foot);
@@ -343,8 +345,8 @@ class StepGenerator {
     return target;
   }
 
-  // Returns the distance between the swinging and the fixed foot, from heel to toe tip, seen from
-  // above.
+  // Returns the horizontal distance between the swinging and the fixed foot, each of which is a
+  // line from heel to toe tip.
   [[nodiscard]] double FeetApart(const Moment& moment) const {
     const LegTarget swinging = TargetAt(moving_, moment);
     const LegTarget still = TargetAt(fixed_, moment);
@@ -363,16 +365,16 @@ class StepGenerator {
     return MomentAt(toe_off_s_ + part * (strike_s_ - toe_off_s_));
   }
 
-  // Leads the swinging foot around the fixed one if the step turns, and raises it until it is clear
-  // of the ground.
+  // If the step turns, leads the swinging foot around the fixed one. Raises it until it clears the
+  // ground.
   void PlanSwing() {
     if (feet_.turn_rad != 0.0) PlanDetour();
     const LegRig::Side& side = person_.rig.side(moving_);
     const double ball_y = person_.stand.balls_m[Index(moving_)].y;
     struct Check {
       Moment moment;
-      double ball_m;  // Least height of the ball.
-      double tip_m;   // Least height of the tip of the toes.
+      double ball_m;  // Minimum height of the ball.
+      double tip_m;   // Minimum height of the toe tip.
     };
     std::vector<Check> checks;
     for (int i = 4; i <= 17; ++i) {
@@ -399,7 +401,7 @@ class StepGenerator {
     });
   }
 
-  // Returns by how much the root is too high for the legs.
+  // Returns by how much the root must be lowered for the legs to reach the feet.
   [[nodiscard]] double MissingReach(const Moment& moment) const {
     double missing = 0.0;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -422,8 +424,9 @@ class StepGenerator {
     return std::max(kMaxExtension, standing) * (side.thigh_m + side.shank_m);
   }
 
-  // Returns how far the root is lowered at each moment, so that the legs reach the feet. At both
-  // ends it depends only on the state, so that steps join.
+  // Returns how far the root is lowered at each moment so that the legs reach the feet. At both
+  // ends the lowering depends only on the state of the avatar, so that successive steps fit
+  // together.
   [[nodiscard]] std::vector<double> Lowering(const std::vector<Moment>& moments) const {
     constexpr int kRounds = 3;
     constexpr int kHalf = 10;
@@ -480,8 +483,8 @@ class StepGenerator {
   double strike_s_ = 0.0;
   double end_s_ = 0.0;
   std::array<double, 2> reach_m_{};  // [Foot]: largest distance from hip to ankle.
-  HermiteCurve captured_;            // Begins and ends like the root of the captured stride.
-  HermiteCurve root_;                // Begins and ends like the root of the generated step.
+  HermiteCurve captured_;            // Curve with the start and end of the captured root.
+  HermiteCurve root_;                // Curve with the start and end of the generated root.
   double detour_m_ = 0.0;
   double lift_m_ = 0.0;
 };

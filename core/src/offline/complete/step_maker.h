@@ -17,37 +17,37 @@ struct Person {
   const Skeleton& skeleton;
   LegRig rig;
   PostureSample stand;                 ///< The stand pose; its heading is 0.
-  std::array<StrideModel, 2> strides;  ///< [Foot]: mean stride of the moving foot.
+  std::array<StrideModel, 2> strides;  ///< [Foot]: mean stride in which this foot moves.
 
   /// Returns the vector from the fixed to the moving foot in the stand pose.
   [[nodiscard]] DVec3 StandVector(Foot moving) const;
 };
 
-/// Feet at both ends of a step, as in the parameters of a general step.
+/// Position of the feet at both ends of a step, as in the parameters of a general step.
 struct StepFeet {
   DVec3 start_m = DVec3(0.0);  ///< Vector from the fixed to the moving foot, in the heading frame.
   DVec3 end_m = DVec3(0.0);
   double turn_rad = 0.0;  ///< Positive is left.
 };
 
-/// Generates a step on level ground. At every time, its posture is a mixture of the stand pose and
-/// of the mean stride of the captures at the same generic time g(t):
+/// Generates a step on level ground. Its posture at generic time g(t) is a blend of the stand pose
+/// and the mean captured stride:
 ///
 ///   posture(t) = (1 - w(t)) stand + w(t) stride(g(t))
 ///
-/// The share w of the stride changes smoothly from the start to the end of the step. At both ends
-/// it depends only on the distance between the feet. Every generated step therefore joins the
-/// captured steps and the stand, and has the posture and style of the person.
+/// The weight w changes smoothly from the start to the end of the step. At both ends it depends
+/// only on the distance between the feet. Every generated step therefore continues captured steps
+/// and the stand pose without a jump, and has the posture and style of the person.
 ///
-/// Feet are placed first, then the root, which follows a cubic curve plus w times the deviation of
-/// the captured root from such a curve. Then inverse kinematics places the legs.
+/// The feet are placed first. The root then follows a cubic curve, plus w times the deviation of
+/// the captured root from such a curve. Finally, inverse kinematics places the legs.
 ///
 /// `names` selects the parameters of the example, which are measured in its first and last pose.
 [[nodiscard]] RawExample MakeStep(const Person& person, Foot moving, const StepFeet& feet,
                                   std::span<const ParameterName> names, std::string source);
 
-/// Generates a step backward: the step with the same feet in reverse order, reversed in time.
-/// `feet.start_m` has the moving foot in front, `feet.end_m` behind.
+/// Generates a step backward by reversing a forward step with exchanged ends in time. The moving
+/// foot is in front in `feet.start_m` and behind in `feet.end_m`.
 [[nodiscard]] RawExample MakeBackwardStep(const Person& person, Foot moving, const StepFeet& feet,
                                           std::span<const ParameterName> names, std::string source);
 

@@ -12,18 +12,18 @@
 namespace stridewire::complete {
 namespace {
 
-// Only steps within these limits are averaged: level, straight ahead, and neither from nor to a
-// stand.
+// Limits on the steps that are averaged: they are level and straight, and neither start nor end in
+// a stand.
 constexpr double kMinLengthM = 0.25;
 constexpr double kMaxRiseM = 0.06;
 constexpr double kMaxTurnRad = 0.2;
 constexpr double kMaxWidthM = 0.4;
-// The ball of the foot rises by 0.02 to 0.09 m in a walk. It rises further in steps over or onto
+// In a walk, the ball of the foot rises by 0.02 to 0.09 m. It rises further in steps over or onto
 // obstacles.
 constexpr double kPlainLiftM = 0.11;
 // Strides whose length differs from the median by more than this are not averaged.
 constexpr double kSameLengthM = 0.12;
-// Half width of the window that smooths a single stride.
+// Half the width of the window that smooths a single stride.
 constexpr double kRoughWindowS = 0.15;
 
 struct Stride {
@@ -66,8 +66,8 @@ bool IsStraightStride(const Stride& stride, Foot moving) {
          std::fabs(stride.example->heading_change_rad) < kMaxTurnRad;
 }
 
-// Returns the straight strides of a foot, from the first group that contains any. Groups of
-// straight steps come first.
+// Returns the straight strides in which a foot moves, from the first group that contains any.
+// Groups of straight steps come first.
 std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
   for (const RawGroup& group : library.groups) {
     if (group.is_completed || group.kind != StepKind(moving)) continue;
@@ -90,8 +90,8 @@ std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
   return {};
 }
 
-// Returns the posture at a time of a stride, which may be outside of it. There, the stride
-// continues as its point reflection about its end.
+// Returns the posture at a time that may be outside the stride. Beyond an end, the stride is
+// continued by point reflection about that end.
 PostureSample SampleAround(const StrideModel& model, double time_s) {
   const double first_s = model.keytimes_s.front();
   const double last_s = model.keytimes_s.back();
@@ -108,10 +108,10 @@ PostureSample SampleAround(const StrideModel& model, double time_s) {
   return sample;
 }
 
-// Smooths the body over time, but not the feet. Both ends of the stride do not change.
+// Smooths the body over time, except for the feet. Both ends of the stride remain unchanged.
 void SmoothBody(double window_s, StrideModel& model) {
-  // Samples on each side of a point. The points are not evenly spaced in time, but the samples are,
-  // so that uniform motion remains uniform.
+  // Number of samples on each side of a point. The points are not evenly spaced in time, but the
+  // samples are, so that uniform motion remains uniform.
   constexpr int kSide = 8;
   const StrideModel rough = model;
   for (std::size_t p = 1; p + 1 < rough.points.size(); ++p) {
@@ -165,12 +165,12 @@ StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides
   model.start_length_m /= count;
   model.end_length_m /= count;
   model.width_m /= count;
-  // The fewer strides are averaged, the more individual variation remains, so smooth more.
+  // The average of few strides contains more individual variation, so it is smoothed more.
   SmoothBody(kRoughWindowS / std::sqrt(count), model);
   return model;
 }
 
-// Returns the mirror images of examples, or nothing if the skeleton cannot be mirrored.
+// Returns the mirror images of examples, or an empty list if the skeleton cannot be mirrored.
 std::vector<RawExample> MirrorImages(const RawLibrary& library, const std::vector<Stride>& strides,
                                      Foot moving) {
   std::vector<ExtractedExample> sources;
@@ -241,8 +241,8 @@ void JoinStrides(std::array<StrideModel, 2>& strides) {
       }
       point.root_m += weight * kShare * (RootFromFeet(to) - RootFromFeet(from));
     };
-    // The correction fades over kFadePart of the time of a stride. Points are not evenly spaced in
-    // time: a third of them is in double support, which may be very short.
+    // The correction fades out over the fraction kFadePart of the stride's duration. Points are not
+    // evenly spaced in time: one third of them is in double support, which may be very short.
     const auto weight_at = [](const StrideModel& stride, std::size_t point, double end_s) {
       const double fade_s = kFadePart * (stride.keytimes_s.back() - stride.keytimes_s.front());
       return 1.0 - SmoothStep(std::fabs(TimeAtPoint(stride.keytimes_s, point) - end_s) / fade_s);

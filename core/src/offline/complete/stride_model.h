@@ -17,8 +17,8 @@ inline constexpr int kPointsPerInterval = 16;
 inline constexpr int kIntervals = 3;
 inline constexpr int kPointCount = kIntervals * kPointsPerInterval + 1;
 
-/// The mean of all strides of one foot in the captures that are level and straight ahead, as a
-/// function of generic time. The horizontal origin is the ball of the fixed foot.
+/// Mean of all level, straight strides of one foot in the captures, as a function of generic time.
+/// The horizontal origin is the ball of the fixed foot.
 struct StrideModel {
   std::vector<PostureSample> points;  ///< [point]
   std::array<double, kIntervals + 1> keytimes_s{};
@@ -27,29 +27,29 @@ struct StrideModel {
   /// Sideways distance of the moving from the fixed foot, outwards; mean of start and end.
   double width_m = 0.0;
 
-  /// Velocities of the root in steps that join others, in m/s. They agree with those of the strides
-  /// of the other foot after JoinStrides.
+  /// Velocities of the root where the stride continues another stride, in m/s. After JoinStrides
+  /// they are equal to those of the other foot's stride.
   DVec3 start_velocity = DVec3(0.0);
   DVec3 end_velocity = DVec3(0.0);
 
   /// Returns the posture at a generic time in [0, 3].
   [[nodiscard]] PostureSample At(double generic_time) const;
-  /// Returns the velocity of the root in the mean stride itself, in m/s.
+  /// Returns the velocity of the root at the start of the mean stride, in m/s.
   [[nodiscard]] DVec3 MeasuredStartVelocity() const;
   [[nodiscard]] DVec3 MeasuredEndVelocity() const;
 };
 
-/// Makes the strides of both feet continue each other. The end of one and the start of the other
-/// are measured on different steps, so they differ. Both get the mean posture and velocity,
-/// and the differences are distributed over 45 % of the time of each stride.
+/// Changes the strides of both feet so that each continues the other. The end of one and the start
+/// of the other are averages of different steps, so they differ. Both get the mean posture and
+/// velocity. The differences are distributed over 45 % of the time of each stride.
 void JoinStrides(std::array<StrideModel, 2>& strides);
 
 /// Returns the time of a point of a stride with these keytimes.
 [[nodiscard]] double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point);
 
-/// Returns the mean stride of a foot. Returns nullopt if the library contains no level stride of
-/// that foot that leads straight ahead. If it contains strides of the other foot only, their mirror
-/// images are used, as far as the skeleton can be mirrored.
+/// Returns the mean stride of a foot. Returns nullopt if the library contains no level, straight
+/// stride of that foot. If it contains strides of the other foot only, their mirror images are
+/// used, provided that the skeleton can be mirrored.
 [[nodiscard]] std::optional<StrideModel> MeasureStride(const RawLibrary& library, Foot moving);
 
 }  // namespace stridewire::complete

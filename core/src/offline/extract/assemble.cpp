@@ -17,11 +17,11 @@ namespace {
 
 constexpr std::size_t kExamplesPerParameter = 3;
 constexpr std::size_t kMinForAnArea = std::size(kStraightStepParameters) + 1;
-// With at least this many examples, the lowest and the highest value are ignored as possible
-// outliers.
+// With at least this many examples, the lowest and the highest value of a parameter are ignored
+// because they may be outliers.
 constexpr std::size_t kOutlierFreeMin = 4;
-// Steps that turn by more than this are left out of groups without the parameter for turns, if
-// other steps remain.
+// Steps that turn by more than this are not added to groups without the turn parameter, if other
+// steps remain.
 constexpr double kStraightTurnMaxRad = 0.6;
 
 // Examples of one kind with all their parameters, before they become a group.
@@ -36,9 +36,10 @@ bool IsHeight(ParameterName name) {
          name == ParameterName::kHeight;
 }
 
-// Returns the range of a parameter in a pool. The lowest and the highest value are ignored if there
-// are enough examples. The range of a height includes 0 and every example, so that neither a single
-// climbing example nor a pool of equally climbing examples counts as level.
+// Returns the range of a parameter in a pool. If there are enough examples, the lowest and the
+// highest value are ignored. The range of a height parameter always includes 0 and every example,
+// so that neither a single climbing example nor a pool of equally climbing examples counts as
+// level.
 double Spread(const Pool& pool, std::size_t parameter) {
   std::vector<double> values;
   for (const RawExample& example : pool.examples) values.push_back(example.parameters[parameter]);
@@ -50,9 +51,9 @@ double Spread(const Pool& pool, std::size_t parameter) {
   return values[values.size() - 1 - skip] - values[skip];
 }
 
-// Returns true if a pool has enough examples for `always` and for the heights that vary in it.
-// Without them, climbing and level examples would be averaged, and the figure would sink into level
-// ground. Examples span a space only if there is at least one more than it has dimensions.
+// Returns true if a pool has enough examples to keep the heights that vary in it as parameters,
+// besides `always`. If climbing and level examples were averaged instead, the figure would sink
+// into level ground. n parameters require at least n + 1 examples.
 bool CanKeepHeights(const Pool& pool, std::span<const ParameterName> always,
                     const AssembleOptions& options) {
   std::size_t needed = always.size() + 1;
@@ -65,14 +66,14 @@ bool CanKeepHeights(const Pool& pool, std::span<const ParameterName> always,
   return !is_varied || pool.examples.size() >= needed;
 }
 
-// Returns the indices of the parameters in which a pool varies, including `always`. Heights that
-// vary are always kept if `with_height`. The number of the others is limited by the number of
-// examples.
+// Returns the indices of the parameters of a group: `always` and those in which the pool varies. If
+// `with_height`, all heights that vary are included. The number of the others is limited by the
+// number of examples.
 std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const ParameterName> always,
                                            bool with_height, const AssembleOptions& options) {
   struct Candidate {
     std::size_t index;
-    double spread;  // Spread of the values, in units of the smallest spread that counts.
+    double spread;  // Range of the values relative to the smallest range that counts.
     bool fixed;
   };
   std::vector<Candidate> candidates;
@@ -177,9 +178,9 @@ class Assembler {
     return examples;
   }
 
-  // Returns the vertical shift that brings the balls of the standing feet of a capture to the
-  // height of the library. Markers may displace a foot (by up to 2 cm), so the foot with the
-  // smaller difference decides.
+  // Returns the vertical shift that brings the balls of a capture's standing feet to the height of
+  // the library. Misplaced markers may displace a foot by up to 2 cm, so the shift is that of the
+  // foot with the smaller difference.
   [[nodiscard]] double Shift(const Extraction& file) const {
     if (!file.has_contacts) return 0.0;
     const double left = ball_height_m_[0] - file.ball_height_m[0];
@@ -233,7 +234,7 @@ class Assembler {
       if (has_climbs && !keeps_heights) has_dropped_climbs = true;
       if (!has_climbs || !keeps_heights) all_steps[f].examples.clear();
       if (level_count <= straight_count) level_steps[f].examples.clear();
-      // Two examples lie on a line, so no weights could reproduce parameters beside it.
+      // With two examples, parameters off the line between them could not be reproduced.
       const bool has_all = !all_steps[f].examples.empty();
       if (has_all && level_count < kMinForAnArea) level_steps[f].examples.clear();
       if ((has_all || !level_steps[f].examples.empty()) && straight_count < kMinForAnArea) {
@@ -257,8 +258,7 @@ class Assembler {
     const auto turn = static_cast<std::size_t>(std::ranges::find(pool.names, ParameterName::kTurn) -
                                                pool.names.begin());
     if (std::ranges::find(spanned, turn) == spanned.end()) {
-      // Requests treat all steps of a group without the parameter for turns as steps straight
-      // ahead.
+      // In a group without the turn parameter, requests treat all steps as straight.
       const auto turns = [&](const RawExample& example) {
         return std::fabs(example.parameters[turn]) > kStraightTurnMaxRad;
       };
@@ -316,7 +316,7 @@ class Assembler {
   std::span<const Extraction> files_;
   std::optional<SkeletonMirror> mirror_;
   std::array<double, 2> ball_height_m_{};  // [foot]
-  std::optional<FeetLeveller> leveller_;   // Set if there is an example.
+  std::optional<FeetLeveller> leveller_;   // Set if there is any example.
 };
 
 bool SameOffsets(const Skeleton& a, const Skeleton& b) {

@@ -15,36 +15,36 @@ namespace stridewire {
 struct AssembleOptions {
   bool steps = true;
   bool jumps = true;
-  bool mirror = false;          ///< Also add the mirror image of every step, for the other foot.
-  bool unsettled_jumps = true;  ///< Keep jumps after which the figure continues to move.
-  /// A group gets a parameter only if its examples spread over at least this range. With four or
-  /// more examples the lowest and the highest value are ignored, since they may be outliers.
+  bool mirror = false;  ///< True: also add the mirror image of every step, for the other foot.
+  bool unsettled_jumps = true;  ///< True: keep jumps after which the figure continues to move.
+  /// A group gets a parameter only if its examples cover at least this range. With four or more
+  /// examples, the lowest and the highest value are ignored, because they may be outliers.
   double spread_min_m = 0.05;
-  double spread_min_rad = 0.0873;  ///< Minimum range of a parameter that is an angle; 5 degrees.
-  ExtractOptions extract;          ///< The assembler sets `target`.
+  double spread_min_rad = 0.0873;  ///< The same for parameters that are angles; 5 degrees.
+  ExtractOptions extract;          ///< Options of the extraction. The assembler sets `target`.
 };
 
 /// Combines the examples of several captures into a RawLibrary with these groups:
 ///
 ///   straight step_left, step_right: straight level steps with start_z and end_z
-///   level step_left, step_right: all steps on level ground with start_z, end_z, and the other x, z
-///       and turn parameters as far as they vary
-///   general step_left, step_right: all steps, if some are not level, with start_z, end_z, and the
-///       other parameters of a general step as far as they vary
-///   jump: length, and height and turn as far as they vary
+///   level step_left, step_right: all steps on level ground with start_z and end_z, and with those
+///     other x, z and turn parameters that vary
+///   general step_left, step_right: all steps, if some are not level, with start_z and end_z, and
+///     with those other parameters of a general step that vary
+///   jump: length, and height and turn if they vary
 ///
-/// A group has at most one parameter per three examples, besides start_z, end_z, length and the
-/// heights. Heights that vary are always parameters. If there are too few examples for that, the
+/// Besides start_z, end_z, length and the heights, a group has at most one parameter per three
+/// examples. Heights that vary are always parameters. If there are too few examples for that, the
 /// general group is omitted, and only jumps to one height are kept. Otherwise, blends of climbing
 /// and level examples would sink into level ground.
 ///
-/// A group without examples of its own is omitted. So are straight or level groups with fewer than
-/// three steps, which span no area, if another group contains those steps.
+/// A group without examples of its own is omitted. Straight or level groups with fewer than three
+/// steps cannot span an area of parameters. They are omitted if another group contains their steps.
 ///
 /// The first usable capture determines the skeleton. Captures with other bone lengths are
 /// retargeted. Captures with another joint tree are rejected; `Extraction::error` names the
-/// differing joints. The floors of recordings differ by centimetres, so each capture is shifted
-/// such that balls rest at the same height in the whole library.
+/// differing joints. The floors of recordings differ by centimetres. Each capture is therefore
+/// shifted so that balls rest at the same height in the whole library.
 class LibraryAssembler {
  public:
   explicit LibraryAssembler(AssembleOptions options = {});
@@ -52,14 +52,15 @@ class LibraryAssembler {
   /// Extracts the movements of a capture. The reference is valid until the next call of Add.
   const Extraction& Add(const Capture& capture);
 
-  /// Appends notes to the result of a capture; `file` counts in the order of Add.
+  /// Appends notes to the result of a capture. `file` is the index of the capture in the order of
+  /// Add.
   void AddNotes(std::size_t file, std::span<const std::string> notes);
 
   /// The results in the order of Add.
   [[nodiscard]] std::span<const Extraction> files() const { return files_; }
 
-  /// Error: kNotFound if no capture contains a usable movement of the requested kinds, or only
-  /// climbing steps that are too few for a group.
+  /// Fails with kNotFound if no capture contains a usable movement of the requested kinds, or if
+  /// there are only climbing steps, but too few for a group.
   [[nodiscard]] Expected<RawLibrary> Assemble() const;
 
  private:
@@ -69,11 +70,11 @@ class LibraryAssembler {
   std::vector<Extraction> files_;
 };
 
-/// Returns true if two skeletons have the same joints: names and parents, in order.
+/// Returns true if two skeletons have joints with the same names and parents, in the same order.
 [[nodiscard]] bool SameJointTree(const Skeleton& a, const Skeleton& b);
 
-/// Describes the first difference of `other` from `first`, a skeleton called `first_name`, for
-/// example "its joint 3 is Neck where a.bvh has Head".
+/// Describes the first difference of `other` from `first`, whose name is `first_name`. Example:
+/// "its joint 3 is Neck where a.bvh has Head".
 [[nodiscard]] std::string TreeDifference(const Skeleton& first, const std::string& first_name,
                                          const Skeleton& other);
 

@@ -10,11 +10,11 @@ namespace stridewire {
 namespace {
 
 constexpr double kPelvisSmoothS = 0.06;
-// Hip joints that are closer to each other, seen from above, give no direction.
+// If the hip joints are horizontally closer than this, they determine no direction.
 constexpr double kHipsApartM = 0.01;
 
 // Returns the yaw of the pelvis, or `fallback_rad` if the line between the hip joints is vertical.
-// It follows from positions, because the axes of the root's own frame may have any direction.
+// The yaw is computed from positions, because the axes of the root's frame may have any direction.
 double PelvisYaw(const Skeleton& skeleton, ConstPoseSpan pose, double fallback_rad) {
   const auto hip = [&](Foot foot) {
     return DVec3(PointPosition(skeleton, pose, skeleton.leg(foot).hip, Vec3(0.0f)));
@@ -23,7 +23,7 @@ double PelvisYaw(const Skeleton& skeleton, ConstPoseSpan pose, double fallback_r
   return std::hypot(left.x, left.z) < kHipsApartM ? fallback_rad : std::atan2(-left.z, left.x);
 }
 
-// Returns the indices of the joints that belong to neither leg, without the root.
+// Returns the indices of all joints except the root and the joints of the legs.
 std::vector<std::size_t> TrunkJoints(const Skeleton& skeleton) {
   const auto count = static_cast<std::size_t>(skeleton.joint_count());
   std::vector<char> in_leg(count, 0);
@@ -103,7 +103,8 @@ BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame
     tracks.pelvis_m.emplace_back(pose.root_position_m);
     if (!trunk.empty()) {
       ForwardKinematics(skeleton, pose, positions, rotations);
-      // Bones count by their length, so that the many joints of the fingers do not prevail.
+      // Bones are weighted by their length, so that the many short bones of the fingers do not
+      // dominate.
       DVec3 sum(0.0);
       double weight = 0.0;
       for (const std::size_t joint : trunk) {

@@ -8,9 +8,8 @@
 
 namespace stridewire {
 
-/// World paths of the points that determine where a figure walks: three points per foot, the pelvis
-/// and the trunk. All vectors have one value per frame of `frames`; index 0 is frame
-/// `frames.begin`.
+/// World trajectories from which movements are detected: three points per foot, the pelvis and the
+/// trunk. All vectors have one value per frame of `frames`; index 0 is frame `frames.begin`.
 struct BodyTracks {
   struct FootTrajectory {
     std::vector<DVec3> ankle_m;
@@ -26,8 +25,8 @@ struct BodyTracks {
   /// Unwrapped yaw of the pelvis; positive is left. The direction from the right to the left hip
   /// joint is 90 degrees to the left of it.
   std::vector<double> pelvis_yaw_rad;
-  /// Mean position of the joints that belong to neither leg, weighted by the lengths of their
-  /// bones. Empty if there are none.
+  /// Mean position of the joints that belong to neither leg, weighted by bone length. Empty if
+  /// there are none.
   std::vector<DVec3> trunk_m;
   double leg_length_m = 0.9;  ///< Length of thigh plus shank, averaged over both legs.
 
@@ -41,8 +40,8 @@ struct BodyTracks {
 /// Computes the tracks for frames [first_frame, end) of a clip.
 [[nodiscard]] BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame);
 
-/// Returns the moving average over `window` frames, extended to an odd number. The end values are
-/// repeated beyond the ends.
+/// Returns the moving average over `window` frames. An even window is extended by one frame. The
+/// end values are repeated beyond the ends.
 [[nodiscard]] std::vector<DVec3> SmoothPath(const std::vector<DVec3>& path, int window);
 
 /// Returns the speed along a path by central differences, one-sided at the ends.

@@ -12,18 +12,18 @@
 namespace stridewire {
 namespace {
 
-// The resting height of a ball is measured only if it rests for at least this time.
+// The resting height of a ball is measured only if the ball rests for at least this time.
 constexpr double kBallStillMinS = 0.03;
-// Shorter times without a foot on the ground are not jumps.
+// If no foot is on the ground for a shorter time than this, the figure is not jumping.
 constexpr double kFlightMinS = 0.15;
 // While a foot rolls off slowly, it may stop for up to this time.
 constexpr double kRollOffMaxS = 0.2;
 
 // Returns the height of the resting ball: the lower quartile over the frames in which the ball
 // hardly moves. If there are too few such frames, for example because a recording ends while only
-// the heel is on the ground, returns an estimate. It is the lower of two quartiles: that of the
-// ball over all frames, and that of the height that the ball would have if the foot was flat below
-// the ankle.
+// the heel is on the ground, returns an estimate. The estimate is the lower of two quartiles: that
+// of the ball's height over all frames, and that of the height that the ball would have if the foot
+// below the ankle were flat.
 double RestingBallHeight(const FootPaths& foot, const FrameRange& frames, double fps) {
   std::vector<double> still;
   std::vector<double> ball;
@@ -64,8 +64,9 @@ class ContactBridge {
     }
   }
 
-  // Joins successive contacts at one place if the foot stays slow between them, and if either the
-  // other foot swings or one of the contacts is so short that the foot was only rolling off.
+  // Merges successive contacts at one place if the foot stays slow between them. In addition,
+  // either the other foot must swing, or one of the contacts must be so short that the foot was
+  // rolling off.
   void Join(const std::vector<char>& other_swings, std::vector<Contact>& contacts) const {
     std::vector<Contact> joined;
     for (const Contact& contact : contacts) {
@@ -104,8 +105,8 @@ class ContactBridge {
   double speed_max_m_s_;
 };
 
-// Returns one flag per frame: non-zero if the foot `other` does not stand and is fast, or if no
-// foot stands for so short a time that the figure cannot have jumped.
+// Returns one flag per frame. It is non-zero if the foot `other` is fast and does not stand, or if
+// no foot stands for a time that is too short for a jump.
 std::vector<char> OtherSwings(const FootPaths& other_foot, int other, double fps,
                               const FootContacts& contacts, const ContactOptions& options) {
   const int count = static_cast<int>(other_foot.slowest_m_s.size());
@@ -155,8 +156,8 @@ FootContacts FindContacts(const BodyTracks& tracks, const ContactOptions& option
   for (int f = 0; f < 2; ++f) contacts.feet[f] = FindRests(feet[f], tracks.fps, options);
   MeasureBallHeights(tracks, options, contacts);
   RemoveUnsupported(tracks, options, contacts);
-  // A contact that has become longer may leave only a short gap to a contact of the other foot,
-  // which the second round closes.
+  // An extended contact may leave only a short gap to a contact of the other foot. The second round
+  // closes that gap.
   for (int round = 0; round < 2; ++round) {
     const std::vector<char> others_swing[2] = {
         OtherSwings(feet[1], 1, tracks.fps, contacts, options),

@@ -6,16 +6,16 @@
 
 namespace stridewire {
 
-/// Thresholds for ground contacts. They fit adults recorded in metres and were tuned on twelve
-/// captured walks. For example, a maximum speed of 0.35 instead of 0.8 m/s loses half of the steps.
+/// Thresholds for ground contacts. They are for adults recorded in metres and were tuned on twelve
+/// captured walks. A maximum speed of 0.35 instead of 0.8 m/s, for example, would miss half of the
+/// steps.
 struct ContactOptions {
-  double speed_max_m_s = 0.8;  ///< A point stands only if it is slower than this.
-  /// A point stands only if it is at most this far above the height at which it rests during that
-  /// contact.
+  double speed_max_m_s = 0.8;  ///< Maximum speed of a standing point.
+  /// Maximum height of a standing point above its resting height during that contact.
   double height_max_m = 0.06;
   double smooth_s = 0.04;
-  double gap_min_s = 0.05;      ///< Gaps between contacts that are shorter than this are filled.
-  double contact_min_s = 0.07;  ///< Contacts that are shorter than this are dropped.
+  double gap_min_s = 0.05;      ///< Shorter gaps between contacts are closed.
+  double contact_min_s = 0.07;  ///< Shorter contacts are dropped.
 };
 
 /// A time span during which a foot is on the ground, in frames of the BodyTracks.
@@ -25,8 +25,8 @@ struct Contact {
 };
 
 struct FootContacts {
-  /// Contacts of each foot, sorted by time and disjoint; indexed by Foot. At least one frame
-  /// separates successive contacts of a foot.
+  /// [Foot]: contacts sorted by time and disjoint. At least one frame separates successive contacts
+  /// of a foot.
   std::vector<Contact> feet[2];
 
   [[nodiscard]] const std::vector<Contact>& foot(Foot f) const { return feet[static_cast<int>(f)]; }
@@ -35,9 +35,9 @@ struct FootContacts {
 /// Detects when each foot stands: when its ankle, ball or toe tip is slow and low (the criteria of
 /// the paper, Section 6).
 ///
-/// "Low" is relative to the height at which the foot rests during that contact, so floors may be
-/// inclined, and kerbs, steps and blocks need no special case. A slow foot in the air is not a
-/// contact: RemoveUnsupported() drops feet that carry no weight.
+/// Heights are relative to the resting height of the foot in that contact, so inclined floors,
+/// kerbs, steps and blocks need no special case. A slow foot in the air is not a contact:
+/// RemoveUnsupported() removes contacts of feet that carry no weight.
 [[nodiscard]] FootContacts FindContacts(const BodyTracks& tracks,
                                         const ContactOptions& options = {});
 
@@ -45,7 +45,7 @@ struct FootContacts {
 [[nodiscard]] std::vector<char> StandingFrames(const std::vector<Contact>& contacts,
                                                int frame_count);
 
-/// Measures `Contact::ball_height_m` of all contacts again on other tracks of the same length.
+/// Measures `Contact::ball_height_m` of all contacts again, on other tracks of the same length.
 void MeasureBallHeights(const BodyTracks& tracks, const ContactOptions& options,
                         FootContacts& contacts);
 

@@ -10,8 +10,9 @@
 namespace stridewire {
 namespace {
 
-constexpr double kShortS = 0.5;          // No step or jump fits into less time.
-constexpr double kNothingMovesM = 0.01;  // Largest extent of the path of a point that rests.
+constexpr double kShortS = 0.5;  // Steps and jumps take at least this time.
+// A point rests if its path extends over at most this distance.
+constexpr double kNothingMovesM = 0.01;
 constexpr double kMostlyShare = 0.5;
 constexpr double kRunSpeed_m_s = 1.8;
 
@@ -46,7 +47,7 @@ double LyingShare(const BodyTracks& tracks) {
   return static_cast<double>(lying) / tracks.size();
 }
 
-// Returns a sentence if the figure runs, otherwise an empty string.
+// Returns a sentence if the figure runs. Otherwise, returns an empty string.
 std::string DescribeRun(const BodyTracks& tracks, const FootContacts& contacts) {
   std::vector<double> flights_s;
   for (const FrameRange& flight : FlightRanges(tracks, contacts)) {

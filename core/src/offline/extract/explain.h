@@ -7,8 +7,8 @@
 
 namespace stridewire {
 
-/// Returns why a capture contains no step and no jump, and what the user can do about it. Empty if
-/// `has_rejections` is true and there is no common reason beyond those of the rejected spans.
+/// Returns why a capture contains no step and no jump, and what the user can do about it. Returns
+/// an empty string if `has_rejections` is true and the rejected spans are the only reasons.
 [[nodiscard]] std::string ExplainNoMovement(const BodyTracks& tracks, const FootContacts& contacts,
                                             bool has_rejections);
 

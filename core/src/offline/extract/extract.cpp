@@ -92,7 +92,7 @@ class Extractor {
     return clip_.Validate();
   }
 
-  // Leaves out still poses at the ends that are not connected to the motion.
+  // Excludes still poses at the ends that are not connected to the motion.
   void SetAsideStillEnds() {
     const FrameRange all{capture_.first_frame, clip_.frame_count()};
     const FrameRange frames = WithoutStillEnds(capture_.skeleton, clip_, capture_.first_frame);
@@ -119,8 +119,8 @@ class Extractor {
     if (!names.empty()) out_.notes.push_back("smoothed joints that vibrate: " + names);
   }
 
-  // Derives the root motion of a figure that walks on the spot, or rejects the capture and returns
-  // true.
+  // If the figure walks on the spot, derives its root motion. If that is not enabled, rejects the
+  // capture and returns true.
   bool HandleWalkOnTheSpot() {
     const GroundTravel travel = MeasureGroundTravel(tracks_);
     if (!WalksOnTheSpot(tracks_, travel)) return false;
@@ -139,7 +139,7 @@ class Extractor {
     return false;
   }
 
-  // Repeats all measurements on a figure with other bone lengths.
+  // Repeats all measurements on a figure with the target's bone lengths.
   void Retarget() {
     const double own = LegLength(capture_.skeleton);
     const double scale = own > 0.0 ? LegLength(out_.skeleton) / own : 1.0;
@@ -177,14 +177,15 @@ class Extractor {
     return 0.5 * (tracks_.feet[0].ball_m[i] + tracks_.feet[1].ball_m[i]);
   }
 
-  // Returns the moving minus the fixed ball, in a frame with this heading.
+  // Returns the vector from the fixed to the moving ball, in a frame with this heading.
   [[nodiscard]] DVec3 FootVectorAt(Foot moving, int frame, double heading_rad) const {
     const auto i = static_cast<std::size_t>(frame);
     return RotateYaw(-heading_rad,
                      tracks_.foot(moving).ball_m[i] - tracks_.foot(OtherFoot(moving)).ball_m[i]);
   }
 
-  // Describes a joint flip within these frames that was not repaired. Empty if there is none.
+  // Describes a joint flip within these frames that was not repaired. Returns an empty string if
+  // there is none.
   [[nodiscard]] std::string FlipWithin(const FrameRange& frames) const {
     const FrameRange in_clip{frames.begin + tracks_.frames.begin,
                              frames.end + tracks_.frames.begin};
@@ -264,8 +265,8 @@ class Extractor {
   [[nodiscard]] bool IsStraight(const StepSegment& step, double& heading) const {
     const double turn = Heading(step.end) - Heading(step.start);
     if (!IsLevel(step) || std::fabs(turn) > options_.straight_turn_max_rad) return false;
-    // The pelvis sways over the standing foot, so its path leads to one side in one step and to the
-    // other side in the next. The path of the feet does not.
+    // The pelvis sways over the standing foot, so its path leads to alternate sides from step to
+    // step. The path of the feet does not.
     const DVec3 start = FeetCentre(step.start);
     const DVec3 end = FeetCentre(step.end);
     if (HorizontalDistance(start, end) > options_.displacement_heading_min_m) {
@@ -282,8 +283,8 @@ class Extractor {
            FootVectorAt(step.moving, step.start, heading).z;
   }
 
-  // Returns the mean pelvis yaw around a standing moment. The stride heading of a jump would
-  // average over too long a time.
+  // Returns the mean pelvis yaw around a moment of standing. For jumps, the stride heading averages
+  // over too long a time.
   [[nodiscard]] double StandingYaw(int frame) const {
     const int reach = static_cast<int>(std::lround(kStandingYawS * 0.5 * clip_.fps));
     const int begin = std::max(0, frame - reach);

@@ -16,38 +16,40 @@ namespace stridewire {
 struct ExtractOptions {
   ContactOptions contacts;
   SegmentOptions segments;
-  // Steps that satisfy the following four conditions are straight.
+  // A step is straight if it is within the following four limits.
   double straight_turn_max_rad = 0.0698;  ///< Limit on the turn of the stride heading; 4 degrees.
   /// Limit on the angle between the motion of the feet and the heading; 15 degrees. Steps with a
   /// larger angle lead sideways or backward.
   double straight_drift_max_rad = 0.262;
   /// Limit on the difference between the heights of the ground under the two feet.
   double level_rise_max_m = 0.05;
-  /// Limit on the sideways distance of the moving from the fixed foot, on its own side.
+  /// Limit on the sideways distance from the fixed to the moving foot, positive towards the moving
+  /// foot's side.
   double straight_side_max_m = 0.3;
-  /// If the centre of the feet moves farther than this, its direction determines the heading more
-  /// accurately than the pelvis.
+  /// If the centre of the feet moves farther than this, the heading is the direction of that
+  /// motion, which is more accurate than the pelvis.
   double displacement_heading_min_m = 0.3;
-  /// If true, a figure that walks on the spot is moved such that its supporting foot stands still.
-  /// Otherwise such captures are rejected.
+  /// True: the root of a figure that walks on the spot is moved so that its supporting foot stands
+  /// still. False: such captures are rejected.
   bool derive_root_motion = false;
   /// Skeleton of the examples, with the same joint tree as the capture. If null, examples get the
   /// skeleton of the capture. If bone lengths differ, contacts and segments are still detected on
-  /// the capture's own figure. Then the path of the root is scaled by the ratio of leg lengths and
+  /// the capture's own figure. The path of the root is then scaled by the ratio of leg lengths, and
   /// everything is measured again.
   const Skeleton* target = nullptr;
 };
 
-/// A usable movement of a capture in normalised form, with all parameters of its kind.
+/// A usable movement of a capture in the frame in which it starts, with all parameters of its kind.
 struct ExtractedExample {
   MovementKind kind = MovementKind::kStepLeft;
   RawExample example;
-  bool settled = true;  ///< Jumps: false if the figure is still moving at the end.
-  bool level = true;    ///< Steps: true if the ground at all three footholds is equal within 5 cm.
-  /// [foot][0 before, 1 after its swing]: height of the captured ground at each foothold, minus the
-  /// expected height. The expected height is equal for all footholds of a level step, for both feet
-  /// before a jump, and for both feet after it. For steps between different heights the difference
-  /// is 0.
+  bool settled = true;  ///< Jumps: false if the figure is still moving at the end of the example.
+  /// Steps: true if the heights of the ground at all three footholds are equal within 5 cm.
+  bool level = true;
+  /// [foot][0 before its swing, 1 after it]: height of the captured ground at each foothold, minus
+  /// the expected height. The expected height is the same for all footholds of a level step, for
+  /// both feet before a jump, and for both feet after it. In steps between different heights the
+  /// difference is 0.
   std::array<std::array<double, 2>, 2> ground_m{};
 };
 
@@ -68,28 +70,29 @@ struct Extraction {
   int steps_right = 0;
   int jumps = 0;
   std::vector<RejectedTime> rejected;
-  /// Notes of the reader, repaired joint flips, and frames that are left out.
+  /// Notes of the reader, repaired joint flips, and excluded frames.
   std::vector<std::string> notes;
-  /// If the capture contains no step and no jump, why and what to do about it. Empty if `rejected`
-  /// gives sufficient reasons.
+  /// If the capture contains no step and no jump: the reason, and what the user can do about it.
+  /// Empty if `rejected` already contains the reasons.
   std::string no_movement_reason;
-  std::string error;  ///< Non-empty: the whole capture is not usable.
+  std::string error;  ///< Why the whole capture is unusable. Empty if it is usable.
 
   Skeleton skeleton;  ///< Skeleton of the examples.
   /// Straight steps with the parameters start_z and end_z. Their heading change is 0.
   std::vector<ExtractedExample> straight_steps;
   /// All steps, with the seven parameters of a general step.
   std::vector<ExtractedExample> general_steps;
-  std::vector<ExtractedExample> jump_examples;  ///< Jumps with length, height and turn.
-  double ball_height_m[2] = {0.0, 0.0};  ///< Height of resting balls above the floor, by foot.
-  /// True if any foot ever stood on the ground. Otherwise the heights are 0.
+  /// Jumps, with the parameters length, height and turn.
+  std::vector<ExtractedExample> jump_examples;
+  double ball_height_m[2] = {0.0, 0.0};  ///< [foot]: height of the resting ball above the floor.
+  /// True if a foot ever stands on the ground. Otherwise, the heights are 0.
   bool has_contacts = false;
 
   struct Stand {
     /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
     Pose pose;
-    double unrest = 0.0;  ///< Deviation from still, upright standing; smaller is better.
-    /// Sum of the height differences between points of the feet and those of flat feet.
+    double unrest = 0.0;  ///< Deviation from standing still and upright.
+    /// Sum of the height differences between the points of the feet and those of flat feet.
     double tilt_m = 0.0;
   };
   std::optional<Stand> stand;  ///< The stillest moment with both feet on the same ground.
@@ -107,17 +110,18 @@ inline constexpr ParameterName kJumpParameters[] = {ParameterName::kLength, Para
 void MeasureStepParameters(const Skeleton& skeleton, std::span<const ParameterName> names,
                            Foot moving, RawExample& step);
 
-/// Finds the steps and standing jumps of a capture and cuts them out as normalised examples.
+/// Finds the steps and standing jumps of a capture and cuts them out as examples, each in the frame
+/// in which it starts.
 ///
 /// Steps keep the frame rate of the capture. Their keytimes are start, toe-off, heel-strike and
-/// end. They start in the stride heading of their first frame, and heights are relative to the
-/// ground under the fixed foot. The keytimes of jumps are start, lowest point, toe-off, landing,
-/// lowest point and end. Parameters are measured at the balls in the first and last pose (paper,
-/// Section 6). Straight steps and jumps keep one heading from start to end, so that a sequence does
+/// end. They start in the stride heading of their first frame. Heights are relative to the ground
+/// under the fixed foot. The keytimes of jumps are start, lowest point, toe-off, landing, lowest
+/// point and end. Parameters are measured at the balls in the first and last pose (paper, Section
+/// 6). Straight steps and jumps keep one heading from start to end, so that sequences of them do
 /// not veer.
 ///
-/// Never fails: `rejected` lists unusable time spans, and `error` is set if the capture is
-/// unusable. If nothing is found, `rejected` or `no_movement_reason` says why.
+/// Never fails. `rejected` lists unusable time spans, and `error` is set if the capture is
+/// unusable. If nothing is found, `rejected` or `no_movement_reason` contains the reason.
 [[nodiscard]] Extraction Extract(const Capture& capture, const ExtractOptions& options = {});
 
 }  // namespace stridewire

@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-// If the foot never lies flat, FlatHeight compares the points at this percentile of their heights.
+// If the foot is never flat, FlatHeight compares the points at this percentile of their heights.
 constexpr double kLowPercentile = 3.0;
 constexpr double kSamePlaceM = 0.06;
 constexpr double kSamePlaceRiseM = 0.15;
@@ -21,7 +21,7 @@ double LowHeight(const std::vector<DVec3>& path) {
   return Percentile(std::move(heights), kLowPercentile);
 }
 
-// Returns the median height of a point above the ball over the frames at which all points rest.
+// Returns the median height of a point above the ball over the frames in which all points rest.
 double FlatHeight(const FootPaths& foot, std::size_t point) {
   std::vector<double> heights;
   for (std::size_t i = 0; i < foot.slowest_m_s.size(); ++i) {

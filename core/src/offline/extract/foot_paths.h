@@ -20,10 +20,10 @@ struct FootPaths {
 
   std::array<std::vector<DVec3>, kPoints> position_m;
   std::array<std::vector<double>, kPoints> speed_m_s;
-  /// Usual height of each point above the ball while all points are at rest. Single stances differ
-  /// from it by up to 5 cm.
+  /// Usual height of each point above the ball while all points are at rest. In single stances the
+  /// heights differ from it by up to 5 cm.
   std::array<double, kPoints> flat_height_m{};
-  /// Speed of the slowest point.
+  /// [frame]: speed of the slowest point.
   std::vector<double> slowest_m_s;
 
   [[nodiscard]] double Height(std::size_t point, int frame) const {
@@ -32,11 +32,13 @@ struct FootPaths {
   [[nodiscard]] bool IsSlower(std::size_t point, int frame, double limit_m_s) const {
     return speed_m_s[point][static_cast<std::size_t>(frame)] <= limit_m_s;
   }
-  /// Returns true if the ball is on one place at two frames: within 6 cm, and 15 cm in height.
+  /// Returns true if the ball is at one place in two frames: within 6 cm horizontally and 15 cm
+  /// vertically.
   [[nodiscard]] bool OnOnePlace(int frame_a, int frame_b) const;
 };
 
-/// Smooths the paths of a foot over `smooth_s` and measures the shape of the flat foot.
+/// Smooths the paths of a foot over `smooth_s` and measures the heights of its points on the flat
+/// foot.
 [[nodiscard]] FootPaths MakeFootPaths(const BodyTracks::FootTrajectory& track, double fps,
                                       double smooth_s);
 

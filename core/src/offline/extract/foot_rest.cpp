@@ -9,20 +9,21 @@
 namespace stridewire {
 namespace {
 
-// A foot that creeps faster than kAtRestM_s all the time rests in its slowest frames.
+// A foot that always moves faster than kAtRestM_s counts as resting in its slowest frames: those up
+// to this percentile of its speed.
 constexpr double kSlowestPercentile = 25.0;
-// The ball counts as the steadiest point unless another one rests this many times as long.
+// The ball is the steadiest point unless another point rests at least this many times as long.
 constexpr double kBallPreference = 2.0;
-// The height of a resting foot is this percentile over the frames at rest.
+// The resting height of a foot is this percentile of its heights in the frames at rest.
 constexpr double kRestPercentile = 10.0;
-// Contacts of one foot at heights that differ by more than this are on different levels.
+// If the heights of two contacts differ by more than this, they are on different levels.
 constexpr double kSameHeightM = 0.04;
-// A landing foot rests on its heel for at most this time, with the ball at most this much above its
-// height on the ground.
+// A landing foot rests on its heel for at most this time. Meanwhile, the ball is at most this much
+// above its resting height.
 constexpr double kLandingMaxS = 0.2;
 constexpr double kHeelStrikeM = 0.08;
-// Before and after a contact, a slow foot also stands at another height if it is at rest there for
-// at least this share of the shortest contact.
+// Before and after a contact, a slow foot may rest at another height. This counts as a contact if
+// it lasts at least this fraction of the shortest contact.
 constexpr double kRestMinShare = 0.5;
 
 using Flags = std::vector<char>;
@@ -61,14 +62,14 @@ class RestFinder {
   }
 
  private:
-  // Below this speed, the foot is at rest within a range of frames.
+  // Returns the speed below which the foot is at rest within a range of frames.
   [[nodiscard]] double RestSpeed(const FrameRange& range) const {
     return std::max(kAtRestM_s, Percentile({foot_.slowest_m_s.begin() + range.begin,
                                             foot_.slowest_m_s.begin() + range.end},
                                            kSlowestPercentile));
   }
 
-  // Returns the point that is at rest in most frames. The ball is preferred, since toe tips are
+  // Returns the point that is at rest in most frames. The ball is preferred, because toe tips are
   // often noisy.
   [[nodiscard]] std::size_t SteadiestPoint(const FrameRange& range, double rest_speed) const {
     std::array<double, FootPaths::kPoints> frames{};
@@ -79,11 +80,11 @@ class RestFinder {
     return static_cast<std::size_t>(std::ranges::max_element(frames) - frames.begin());
   }
 
-  // The heights at which each point of the foot rests.
+  // Resting heights of the points of the foot.
   using RestHeights = std::array<double, FootPaths::kPoints>;
 
-  // Measures the lowest height at which the foot rests within a range. A point that is never at
-  // rest at that time is at its height on the usual flat foot.
+  // Measures the lowest height at which the foot rests within a range. For a point that never rests
+  // in the range, uses its height on the usual flat foot.
   [[nodiscard]] RestHeights MeasureRest(const FrameRange& range, double rest_speed) const {
     const std::size_t steadiest = SteadiestPoint(range, rest_speed);
     std::vector<double> heights;
@@ -118,8 +119,7 @@ class RestFinder {
     return false;
   }
 
-  // Returns false if the foot only slows down for a moment, for example while it is lowered from a
-  // step.
+  // Returns false if the foot only slows down for a moment, for example while it steps down.
   [[nodiscard]] bool ComesToRest(const FrameRange& range) const {
     const auto at_rest = std::count_if(foot_.slowest_m_s.begin() + range.begin,
                                        foot_.slowest_m_s.begin() + range.end,
@@ -146,7 +146,7 @@ class RestFinder {
     if (ComesToRest({end, range.end})) Collect({end, range.end});
   }
 
-  // Joins contacts at the same height or on one place with short gaps, and separates contacts
+  // Merges contacts at one height or place that are separated by short gaps. Separates contacts
   // without a gap.
   void Join() {
     std::vector<Contact> joined;
@@ -168,8 +168,8 @@ class RestFinder {
     found_ = std::move(joined);
   }
 
-  // Moves the edges of two contacts at different heights to the moments at which the foot leaves
-  // its rest and comes to rest again.
+  // Moves the ends of two contacts at different heights to the moments at which the foot leaves its
+  // rest and comes to rest again.
   void Separate(FrameRange& before, FrameRange& after) const {
     const double fast_before = RestSpeed(before);
     const double fast_after = RestSpeed(after);

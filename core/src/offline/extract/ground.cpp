@@ -8,18 +8,20 @@
 namespace stridewire {
 namespace {
 
-constexpr double kFeetDifferMaxM = 0.03;  // Markers may be displaced by this much between feet.
+// Maximum difference of the resting heights of the two feet, caused by displaced markers.
+constexpr double kFeetDifferMaxM = 0.03;
 constexpr double kBallUsualM = 0.04;
 constexpr double kBallPlausibleMinM = 0.01;
 constexpr double kBallPlausibleMaxM = 0.09;
-// Contacts on one piece of level ground differ by at most this.
+// Maximum difference of the heights of contacts on one piece of level ground.
 constexpr double kLevelBandM = 0.03;
-constexpr double kLevelShareMin = 0.2;  // Levels with a smaller share of the contacts are ignored.
-// The score of a level is its share of the contacts minus its deviation from the usual height, in
-// units of kDeviationM.
+// Levels with a smaller fraction of the contacts are ignored.
+constexpr double kLevelShareMin = 0.2;
+// The score of a level is its fraction of the contacts, minus its deviation from the usual height
+// in units of kDeviationM.
 constexpr double kDeviationM = 0.06;
 
-// Returns how much higher the right ball rests than the left one: the median over all pairs of
+// Returns the height of the right resting ball above the left one: the median over all pairs of
 // contacts that overlap in time and are on the same level.
 double RightAboveLeft(const FootContacts& contacts) {
   std::vector<double> differences;
@@ -34,8 +36,8 @@ double RightAboveLeft(const FootContacts& contacts) {
   return Median(std::move(differences));
 }
 
-// Returns the height of balls on the level that is closest to y = 0 and has many contacts, or the
-// usual height if no level is near y = 0.
+// Returns the height of the resting balls. Chooses a level with many contacts that is close to y =
+// 0. Returns the usual height if there is no such level.
 double BallHeight(std::vector<double> heights) {
   std::ranges::sort(heights);
   const auto count = static_cast<double>(heights.size());

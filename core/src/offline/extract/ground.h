@@ -4,13 +4,13 @@
 
 namespace stridewire {
 
-/// The resting heights of the feet, from which the ground below each contact follows. There is no
-/// common floor: each contact has the height of its own piece of ground.
+/// Resting heights of the feet, from which the height of the ground below each contact is computed.
+/// Different contacts may be on ground of different heights.
 struct Ground {
-  double ball_height_m[2] = {0.0, 0.0};  ///< Height of resting balls above the ground, by foot.
+  double ball_height_m[2] = {0.0, 0.0};  ///< [foot]: height of the resting ball above the ground.
   bool has_contacts = false;
 
-  /// Returns the height of the ground below a foot with this resting height of its ball.
+  /// Returns the height of the ground below a foot whose ball rests at this height.
   [[nodiscard]] double Below(Foot foot, double ball_height_in_capture_m) const {
     return ball_height_in_capture_m - ball_height_m[static_cast<int>(foot)];
   }

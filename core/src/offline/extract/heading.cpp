@@ -16,11 +16,13 @@ constexpr double kStepMinS = 0.25;
 constexpr double kStepMaxS = 1.0;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-// The fit at the ends of a recording uses priors with these standard deviations.
+// Standard deviations of the noise, and of the priors for slope and oscillation, in the fit at the
+// ends of a recording.
 constexpr double kNoiseRad = 4.0 * kDegree;
 constexpr double kSlopeRadPerS = 50.0 * kDegree;
 constexpr double kOscillationRad = 8.0 * kDegree;
-// Neighbouring frames are strongly correlated, so n frames count as n times this many measurements.
+// Neighbouring frames are strongly correlated, so n frames count as n times this many independent
+// measurements.
 constexpr double kIndependentShare = 0.1;
 
 struct StepTime {
@@ -28,8 +30,8 @@ struct StepTime {
   double frames = 0.0;
 };
 
-// Returns the times from each heel-strike to the next one of the other foot, sorted and filtered by
-// a median of three.
+// Returns the times from each heel-strike to the next one of the other foot. The times are sorted
+// and filtered by a median of three.
 std::vector<StepTime> StepTimes(const FootContacts& contacts, double fps) {
   struct Strike {
     int frame;

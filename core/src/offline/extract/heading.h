@@ -10,11 +10,12 @@ namespace stridewire {
 /// Returns the stride heading for every frame of the tracks: the pelvis yaw averaged over one
 /// stride (two step durations, centred). It is unwrapped, and positive is left.
 ///
-/// Even in straight walks the pelvis yaws by 5 to 13 degrees with every step. Used as heading, it
-/// would make forty equal steps veer by a quarter turn. Near the ends of a recording half of the
-/// stride is missing. There a line plus an oscillation of stride length is fitted, with priors of
-/// 0 +- 50 degrees/s for the slope and 8 degrees for the oscillation. A quarter stride from the end
-/// this differs by 1.5 degrees from the full average, instead of 3.6.
+/// Even in straight walks, the pelvis yaws by 5 to 13 degrees with every step. If its yaw were the
+/// heading, forty equal steps would veer by a quarter turn. Near the ends of a recording, half of
+/// the stride is missing. There, the function fits a line plus an oscillation of stride length. The
+/// priors are 0 +- 50 degrees/s for the slope and 8 degrees for the oscillation. A quarter stride
+/// from the end, the result differs from the full average by 1.5 degrees. Without the fit it would
+/// be 3.6 degrees.
 [[nodiscard]] std::vector<double> StrideHeading(const BodyTracks& tracks,
                                                 const FootContacts& contacts);
 

@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-// A foot of a stand pose that is farther from the ground than this does not stand on it.
+// In a stand pose, a foot farther from the ground than this does not stand on it.
 constexpr double kMaxStandErrorM = 0.04;
 
 // Increases smoothly from 0 at the time `from_s` to 1 at `to_s`.
@@ -17,7 +17,7 @@ double Ramp(double time_s, double from_s, double to_s) {
   return SmoothStep((time_s - from_s) / std::max(to_s - from_s, 1e-6));
 }
 
-// The times between which the moving feet are in the air, in seconds.
+// Times in seconds between which the moving feet are in the air.
 struct Flight {
   double toe_off_s = 0.0;
   double landing_s = 0.0;
@@ -55,8 +55,8 @@ void FeetLeveller::Level(ExtractedExample& example, std::span<const ParameterNam
     }
     double root_m = 0.5 * (raise_m[0] + raise_m[1]);
     if (is_step) {
-      // The moving foot carries half of the weight in the middle of a double support, and none
-      // while it is in the air.
+      // In the middle of double support the moving foot carries half of the weight, and while it is
+      // in the air it carries none.
       const double share =
           0.5 * (1.0 - Ramp(t, 0.0, flight.toe_off_s) + Ramp(t, flight.landing_s, end_s));
       const auto m = static_cast<std::size_t>(MovingFoot(example.kind));

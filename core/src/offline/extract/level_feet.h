@@ -10,24 +10,24 @@ namespace stridewire {
 
 /// Puts the feet of examples on level ground.
 ///
-/// The floor of a recording is never level: markers, tilted floors and drifting sensors move the
-/// ground under successive contacts by a centimetre or two, and the feet of blends would hover or
-/// sink by as much. Each foot is moved up or down by the error of the contact it is in. The error
-/// changes during the swing. The root follows the feet in proportion to the weight that they carry,
-/// and the legs bend for the rest.
+/// The floor of a recording is never exactly level. Markers, tilted floors and drifting sensors
+/// move the ground below successive contacts by one or two centimetres. Feet of blends would hover
+/// or sink by as much. Each foot is therefore moved up or down by the error of its current contact,
+/// which changes during the swing. The root follows the feet in proportion to the weight that they
+/// carry. The legs bend to absorb the remaining difference.
 class FeetLeveller {
  public:
   /// `ball_height_m` [foot]: height at which the balls of standing feet rest. `hinges` [foot]: see
-  /// LegRig::Side::hinge. Does nothing but shift the root if planting does not support the legs.
+  /// LegRig::Side::hinge. If planting does not support the legs, the leveller only shifts the root.
   FeetLeveller(const Skeleton& skeleton, ConstPoseSpan any_pose, const std::array<Vec3, 2>& hinges,
                const std::array<double, 2>& ball_height_m);
 
-  /// Moves the feet of a step or a jump by -`example.ground_m`, and measures the parameters `names`
-  /// of a step again.
+  /// Moves the feet of a step or jump by -`example.ground_m`. Measures the parameters `names` of a
+  /// step again.
   void Level(ExtractedExample& example, std::span<const ParameterName> names) const;
 
-  /// Puts both balls of a standing pose at rest. Leaves the pose unchanged if a foot is too far
-  /// from the ground to stand on it.
+  /// Puts both balls of a standing pose at their resting height. Leaves the pose unchanged if a
+  /// foot is too far from the ground to stand on it.
   void Level(PoseSpan stand) const;
 
  private:

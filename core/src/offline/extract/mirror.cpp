@@ -12,7 +12,8 @@
 namespace stridewire {
 namespace {
 
-// A joint is rigid if it turns by less than this relative to its parent (root mean square).
+// A joint is rigid if its rotation relative to its parent varies by less than this (root mean
+// square).
 constexpr double kRigidRad = 0.01;
 
 // A bone and the mirror image of its partner, in the frames of their joints.
@@ -64,7 +65,7 @@ std::vector<MirroredBone> BonesOfJoint(const Skeleton& skeleton, const std::vect
     if (site.joint == own) own_sites.push_back(site.offset_m);
     if (site.joint == partner) partner_sites.push_back(site.offset_m);
   }
-  // Several end sites of one joint have no names that would pair them.
+  // Several end sites of one joint cannot be paired, because they have no names.
   if (own_sites.size() == 1 && partner_sites.size() == 1) add(own_sites[0], partner_sites[0]);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const Leg& leg = skeleton.leg(foot);
@@ -97,7 +98,7 @@ std::vector<MirroredBone> BonesOfBody(const Skeleton& skeleton, const Posture& p
   return bones;
 }
 
-// Returns which joints are the ankle of a foot or below it.
+// Returns one flag per joint: true if it is the ankle of a foot or below it.
 std::vector<bool> JointsOfFoot(const Skeleton& skeleton, Foot foot) {
   std::vector<bool> in_foot(skeleton.joints.size(), false);
   const auto ankle = static_cast<std::size_t>(skeleton.leg(foot).ankle);
@@ -108,8 +109,8 @@ std::vector<bool> JointsOfFoot(const Skeleton& skeleton, Foot foot) {
   return in_foot;
 }
 
-// Returns the frames of a step in which the sole of the fixed foot is flat on the ground, since the
-// other foot swings past it.
+// Returns the frames of a step in which the sole of the fixed foot is flat on the ground, because
+// the other foot swings past it.
 FrameRange FlatFrames(const ExtractedExample& step) {
   constexpr double kBegin = 0.25;
   constexpr double kEnd = 0.5;
@@ -121,7 +122,8 @@ FrameRange FlatFrames(const ExtractedExample& step) {
   return {frame_at(kBegin), frame_at(kEnd) + 1};
 }
 
-// Adds the up direction in the frames of the joints of the standing foot while it is flat.
+// Adds the up direction, in the frames of the standing foot's joints, over the frames in which the
+// foot is flat.
 void AddSoles(const Skeleton& skeleton, const ExtractedExample& example,
               std::vector<DVec3>& sole_up) {
   if (!IsStep(example.kind)) return;
@@ -135,8 +137,8 @@ void AddSoles(const Skeleton& skeleton, const ExtractedExample& example,
   }
 }
 
-// Replaces the bones of a foot by their parts along the ground, and adds the normal of the sole.
-// `up` and `image_up` are the normals in the frames of the bones; zero for joints above a foot.
+// Projects the bones of a foot onto the ground, and adds the normal of the sole. `up` and
+// `image_up` are the normals in the frames of the bones. They are zero for joints above a foot.
 void MirrorFromAbove(const DVec3& up, const DVec3& image_up, std::vector<MirroredBone>& bones) {
   constexpr double kNormalM = 0.1;
   if (up == DVec3(0.0) || image_up == DVec3(0.0)) return;
@@ -147,8 +149,8 @@ void MirrorFromAbove(const DVec3& up, const DVec3& image_up, std::vector<Mirrore
   bones.push_back({kNormalM * up, kNormalM * image_up});
 }
 
-// Returns the rotation that takes the bones to their images with the smallest squared error. Bones
-// along one line do not determine the rotation about that line; it is taken from `start`. For that
+// Returns the rotation from the bones to their images with the smallest squared error. Collinear
+// bones do not determine the rotation about their line, so it is taken from `start`. For that
 // purpose, each pass also fits the result of the previous pass, with the weight of a 1 cm bone.
 DQuat FitTurn(std::span<const MirroredBone> bones, const DQuat& start) {
   constexpr double kStartWeightM2 = 1e-4;
@@ -215,7 +217,7 @@ std::optional<SkeletonMirror> FindSkeletonMirror(const Skeleton& skeleton, const
     const int parent = skeleton.joints[j].parent;
     const DQuat above =
         parent < 0 ? DQuat(1.0, 0.0, 0.0, 0.0) : mirror.turns[static_cast<std::size_t>(parent)];
-    // With this turn, mirroring leaves the joint's mean rotation relative to its parent as it is.
+    // With this turn, mirroring does not change the joint's mean rotation relative to its parent.
     const DQuat keeps_mean = Mirrored(glm::conjugate(DQuat(posture.mean.rotations[partner]))) *
                              above * DQuat(posture.mean.rotations[j]);
     if (IsRigid(posture, mirror.partners, j)) {

@@ -18,20 +18,20 @@ struct SkeletonMirror {
   ///
   ///   W'_j = M W_p M turns[j],   p = partners[j]
   ///
-  /// The turn takes the bones of the joint to the mirror images of its partner's bones, so that
-  /// mirrored bones point in mirrored directions, whatever the axes of the joints' frames are.
+  /// The turn maps the bones of the joint to the mirror images of its partner's bones. Mirrored
+  /// bones therefore point in mirrored directions, whatever the axes of the joints' frames are.
   std::vector<DQuat> turns;
 };
 
-/// Properties of a figure's posture over its examples, which mirroring uses.
+/// Properties of a figure's posture, averaged over its examples, that mirroring uses.
 struct Posture {
   /// Mean of each joint's rotation relative to its parent, and of the root's relative to the
   /// heading. The root is at the origin. The identity if there are no examples.
   Pose mean;
-  /// [joint]: true if the joint does not turn relative to its parent.
+  /// [joint]: true if the joint does not rotate relative to its parent.
   std::vector<bool> is_rigid;
-  /// [joint]: mean up direction in the joint's own frame while its foot stands flat on the ground;
-  /// a unit vector. Zero for joints that do not belong to a foot, and for feet that never stand
+  /// [joint]: mean up direction in the joint's own frame while its foot stands flat on the ground,
+  /// as a unit vector. Zero for joints that do not belong to a foot, and for feet that never stand
   /// while the other foot swings.
   std::vector<DVec3> sole_up;
 };
@@ -41,18 +41,18 @@ struct Posture {
 
 /// Returns the mirror of a skeleton, or nullopt if its joints cannot be paired (FindMirrorJoints).
 ///
-/// A joint and the joints that are rigid relative to it form one body. If its bones have different
-/// directions, they determine its turn. A single bone leaves a rotation about the bone open. It is
-/// chosen such that the mean posture changes as little as possible. Bones of a foot are mirrored as
-/// seen from above: a flat sole stays flat, although the balls of both feet may be at different
-/// heights.
+/// A joint and the joints that are rigid relative to it form one body. If the bones of a body have
+/// different directions, they determine its turn. A single bone does not determine the rotation
+/// about itself, so that rotation is chosen to change the mean posture as little as possible. Bones
+/// of a foot are mirrored as seen from above. A flat sole thus stays flat, even if the balls of
+/// both feet are at different heights.
 [[nodiscard]] std::optional<SkeletonMirror> FindSkeletonMirror(const Skeleton& skeleton,
                                                                const Posture& posture);
 
-/// Returns the mirror image of a movement. A left step becomes a right step; sideways parameters
-/// and the turn change sign. Bones keep their own lengths, so a figure that is not perfectly
-/// symmetric differs from the mirror image by these lengths, and the parameters of steps are
-/// measured again at the balls. `names` are the names of `source.example.parameters`.
+/// Returns the mirror image of a movement. A left step becomes a right step. Sideways parameters
+/// and the turn change sign. Bones keep their own lengths. In a figure that is not perfectly
+/// symmetric, the parameters of steps are therefore measured again at the balls. `names` are the
+/// names of `source.example.parameters`.
 [[nodiscard]] ExtractedExample MirrorExample(const Skeleton& skeleton, const SkeletonMirror& mirror,
                                              std::span<const ParameterName> names,
                                              const ExtractedExample& source);

@@ -24,8 +24,8 @@ struct SideInName {
   std::string_view other;
 };
 
-// Returns true if the letter at `at` begins and ends a word, as in "thigh_L", "AnkleL", "J_Bip_L"
-// and "LHipJoint", or is the first letter of the name.
+// Returns true if the letter at `at` is a word of its own, as in "thigh_L", "AnkleL", "J_Bip_L" and
+// "LHipJoint", or the first letter of the name.
 bool IsWord(std::string_view name, std::size_t at) {
   const bool begins =
       at == 0 || !IsLetter(name[at - 1]) || (IsUpper(name[at]) && IsLower(name[at - 1]));
@@ -34,7 +34,7 @@ bool IsWord(std::string_view name, std::size_t at) {
   return begins && ends && name.size() > 1;
 }
 
-// Finds the words that say left or right.
+// Finds the words for left and right.
 std::vector<SideInName> SideWordsOf(std::string_view name) {
   std::vector<SideInName> sides;
   for (const auto& [left, right] : kSideWords) {
@@ -48,7 +48,7 @@ std::vector<SideInName> SideWordsOf(std::string_view name) {
   return sides;
 }
 
-// Finds the single letters that may say left or right.
+// Finds the single letters that may stand for left or right.
 std::vector<SideInName> SideLettersOf(std::string_view name) {
   constexpr std::string_view kLetters = "LRlr";
   constexpr std::string_view kOthers = "RLrl";
@@ -61,8 +61,8 @@ std::vector<SideInName> SideLettersOf(std::string_view name) {
   return sides;
 }
 
-// Returns the joint whose name is `name` with one or all of its words for left and right exchanged,
-// or -1.
+// Returns the joint whose name is `name` with one or all of its words for left and right exchanged.
+// Returns -1 if there is none.
 int JointOfOtherSide(const Skeleton& skeleton, std::string_view name,
                      std::vector<SideInName> sides) {
   for (const SideInName& side : sides) {
@@ -76,8 +76,8 @@ int JointOfOtherSide(const Skeleton& skeleton, std::string_view name,
   return skeleton.FindJoint(other);
 }
 
-// Returns the partner of a joint by its name; the joint itself if the name has no side, and -1 if
-// there is no joint for the other side.
+// Returns the partner of a joint according to its name. Returns the joint itself if the name
+// contains no side, and -1 if there is no joint on the other side.
 int PartnerByName(const Skeleton& skeleton, int joint) {
   const std::string& name = skeleton.joints[static_cast<std::size_t>(joint)].name;
   const std::vector<SideInName> words = SideWordsOf(name);
@@ -92,7 +92,8 @@ int PartnerByName(const Skeleton& skeleton, int joint) {
     letters.insert(letters.end(), words.begin(), words.end());
     return JointOfOtherSide(skeleton, name, letters);
   }
-  // A single letter is a side only if the joint of the other side exists ("Root", "Ribs").
+  // A single letter stands for a side only if there is a joint for the other side. The R of "Root"
+  // and "Ribs" does not.
   const int other = letters.empty() ? -1 : JointOfOtherSide(skeleton, name, letters);
   return other >= 0 ? other : joint;
 }
@@ -120,7 +121,8 @@ std::optional<std::vector<int>> PairByName(const Skeleton& skeleton) {
 constexpr double kNoPair = 1e9;
 constexpr double kShapeShare = 0.08;  // Relative tolerance for the lengths of a mirrored pair.
 constexpr double kShapeM = 0.01;      // Absolute tolerance, added to the relative one.
-// Two vectors of equal length differ by at most this share of it if they are within 60 degrees.
+// Maximum distance between two vectors of equal length, as a fraction of the length. The value
+// allows an angle of 60 degrees.
 constexpr double kDirectionShare = 1.0;
 
 // Pairs joints by their bones in a pose; x = 0 is the plane of symmetry.
@@ -151,7 +153,8 @@ class ShapePairs {
   }
 
  private:
-  // Returns the distance of the bone to `b` from the mirror image of the bone to `a`, or kNoPair.
+  // Returns the distance between the bone to `b` and the mirror image of the bone to `a`. Returns
+  // kNoPair if the bones do not match.
   [[nodiscard]] double BoneCost(int a, int b) const {
     if (a == 0 || b == 0) return a == b ? 0.0 : kNoPair;
     const DVec3& u = bones_m_[Index(a)];
@@ -164,8 +167,8 @@ class ShapePairs {
     return fits ? apart : kNoPair;
   }
 
-  // Pairs each child of `a` with the best fitting child of `b` (`a` may equal `b`) and returns the
-  // total cost. Returns kNoPair if a child remains without partner.
+  // Pairs each child of `a` with the best matching child of `b` and returns the total cost. `a` may
+  // equal `b`. Returns kNoPair if a child has no partner.
   double PairChildren(int a, int b, std::vector<std::pair<int, int>>* pairs) {
     const std::vector<int>& from = children_[Index(a)];
     const std::vector<int>& to = children_[Index(b)];
@@ -192,7 +195,7 @@ class ShapePairs {
     return cost;
   }
 
-  // Returns the memoized cost of pairing `a` with `b` and all joints below them.
+  // Returns the cost of pairing `a` with `b` and all joints below them. Costs are memoized.
   double Cost(int a, int b) {
     double& known = costs_[Index(a) * skeleton_.joints.size() + Index(b)];
     if (known < 0.0) {

@@ -7,14 +7,16 @@
 
 namespace stridewire {
 
-/// Returns the index of the mirrored joint for each joint; joints on the spine map to themselves.
+/// Returns the index of the mirrored joint for each joint. Joints on the spine map to themselves.
 ///
 /// Joints are paired by names. A side is Left or Right anywhere in the name, or a single L or R, l
 /// or r, at the start of the name or as a word of its own. If the names do not pair all joints,
-/// they are paired by shape. Then the legs are partners, and so are joints whose bones, including
-/// all bones below, have equal lengths (within 8 % and 1 cm) and point in mirrored directions
-/// (within 60 degrees) in the pose `reference`, which must face +Z. Returns nullopt if a joint off
-/// the plane of symmetry remains without partner.
+/// joints are paired by shape. In this case the legs are partners. Other joints are partners if
+/// their bones, including all bones below, have equal lengths (within 8 % and 1 cm) and point in
+/// mirrored directions (within 60 degrees). Directions are those of the pose `reference`, which
+/// must face +Z.
+///
+/// Returns nullopt if a joint off the plane of symmetry has no partner.
 [[nodiscard]] std::optional<std::vector<int>> FindMirrorJoints(const Skeleton& skeleton,
                                                                ConstPoseSpan reference);
 

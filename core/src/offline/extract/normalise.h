@@ -11,10 +11,10 @@ namespace stridewire {
 ///   r_root <- q_h^-1 r_root,   t <- q_h^-1 (t - t_0),   q_h = rotation by `heading_rad` about +Y
 ///
 /// with t_0 = (x of the first frame, `ground_m`, z of the first frame). Unlike in the paper, y is
-/// not moved to the origin, since that would make the height of an avatar a random walk. The
+/// not moved to the origin, because the height of an avatar would then be a random walk. The
 /// heading is an argument (the stride heading), because the heading of the pelvis oscillates with
-/// every step. Rotation tracks become continuous in sign. `frames` must be a non-empty range within
-/// the clip.
+/// every step. The signs of successive quaternions become continuous. `frames` must be a non-empty
+/// range within the clip.
 [[nodiscard]] Clip NormaliseClip(const Clip& clip, const FrameRange& frames, double heading_rad,
                                  double ground_m);
 

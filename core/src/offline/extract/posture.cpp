@@ -5,11 +5,12 @@
 namespace stridewire {
 namespace {
 
-// Limits on the height of the pelvis, as shares of the leg length, and on the sine of the angle of
-// the trunk above the horizontal.
+// Limits below which a figure lies or crawls: the height of the pelvis as a fraction of the leg
+// length, and the sine of the angle between trunk and ground.
 constexpr double kLowPelvisShare = 0.65;
 constexpr double kFlatTrunkSine = 0.45;
-// On hands and feet, the pelvis is higher, but the trunk does not rise from it.
+// When a figure crawls on hands and feet, the pelvis is higher, but the trunk does not rise from
+// it.
 constexpr double kRaisedPelvisShare = 0.85;
 constexpr double kLevelTrunkSine = 0.1;
 

@@ -12,15 +12,15 @@ namespace stridewire {
 namespace {
 
 constexpr double kLevelPercentile = 3.0;
-// The motion of each point of the feet counts with the weight exp(-height / kFadeM).
+// The motion of each point of the feet has the weight exp(-height / kFadeM).
 constexpr double kFadeM = 0.005;
 // If all points of the feet are higher than this, the figure is in the air.
 constexpr double kAirM = 0.06;
-// Motion of supporting feet below this speed does not count as motion of the ground.
+// Slower motion of supporting feet is sliding, not motion of the ground.
 constexpr double kSlideMin_m_s = 0.2;
-// A figure walks on the spot if the ground moves by at least kTravelMinM below it. The other limits
-// are fractions of the length of that path: the largest extent of the pelvis's motion, the smallest
-// fraction for which each foot is the supporting foot, and the smallest net displacement.
+// A figure walks on the spot if the ground below it moves by at least kTravelMinM. The other limits
+// are fractions of the length of that path: the maximum extent of the pelvis's motion, the minimum
+// fraction for which each foot is the supporting foot, and the minimum net displacement.
 constexpr double kTravelMinM = 0.5;
 constexpr double kPelvisShare = 0.25;
 constexpr double kFootShareMin = 0.2;
@@ -90,7 +90,7 @@ bool WalksOnTheSpot(const BodyTracks& tracks, const GroundTravel& travel) {
       travel.left_share > 1.0 - kFootShareMin) {
     return false;
   }
-  // The legs of a figure that hangs or dances swing forward as much as backward.
+  // The legs of a figure that hangs or dances swing forward and backward by the same amount.
   DVec3 one_way(0.0);
   for (std::size_t i = 0; i + 1 < travel.position_m.size(); ++i) {
     one_way +=

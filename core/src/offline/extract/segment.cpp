@@ -15,10 +15,10 @@ namespace {
 
 constexpr double kHalfSupportDefaultS = 0.08;
 // If a recording begins or ends during a double support, at least this fraction of the usual half
-// support must be left.
+// of a double support must be recorded.
 constexpr double kHalfSupportMinShare = 0.5;
 
-// A swing of a foot with the contacts before and after it.
+// A swing of a foot, with the contacts before and after it.
 struct Swing {
   Foot moving = Foot::kLeft;
   const Contact* before = nullptr;  // Contacts of the moving foot.
@@ -59,7 +59,8 @@ std::vector<Swing> FindSwings(const FootContacts& contacts) {
   return swings;
 }
 
-// Returns the median of half the double support, over walking swings whose supports are complete.
+// Returns half the median duration of double support. Uses walking swings whose supports are
+// complete.
 double UsualHalfSupport(const std::vector<Swing>& swings, int frame_count, double fps,
                         double standing_max_s) {
   std::vector<double> halves;
@@ -136,9 +137,9 @@ class StepFinder {
   }
 
  private:
-  // Returns the frames between the swing and the centre of a double support of `frames`, limited by
-  // standing_max_s. If the recording cuts the support off, returns the usual half if it fits, or 0
-  // if too little is left.
+  // Returns the number of frames between the swing and the centre of a double support that lasts
+  // `frames` frames, limited by standing_max_s. If the recording cuts the support off, returns the
+  // usual value if enough frames remain, and otherwise 0.
   [[nodiscard]] int Half(int frames, bool cut_off) const {
     double half = 0.5 * frames;
     if (cut_off && half < usual_half_) {
@@ -162,7 +163,8 @@ Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
   STRIDEWIRE_CHECK(tracks.fps > 0.0);
   Segmentation result;
   std::vector<FrameRange> held;
-  std::vector<FrameRange> explained;  // Flights that are jumps or have already been rejected.
+  // Flights that are jumps, and flights that have already been rejected.
+  std::vector<FrameRange> explained;
   for (const FrameRange& flight : FlightRanges(tracks, contacts)) {
     JumpFinding finding = FindJump(tracks, contacts, flight, options);
     if (finding.jump) {

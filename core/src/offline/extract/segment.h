@@ -10,18 +10,19 @@ namespace stridewire {
 
 /// Thresholds that decide which parts of a recording are steps and jumps.
 struct SegmentOptions {
-  double standing_max_s = 0.4;        ///< Longest part of a standing phase that belongs to a step.
-  double swing_min_s = 0.1;           ///< A swing takes at least this time.
-  double swing_max_s = 2.0;           ///< A swing takes at most this time.
-  double moved_min_m = 0.04;          ///< A step moves the foot by at least this, or
-  double turned_min_rad = 0.09;       ///< turns the foot by at least this angle.
-  double support_slide_max_m = 0.12;  ///< Largest motion of the other foot's ball in a swing.
-  double flight_min_s = 0.15;         ///< Shortest flight of a jump.
-  double flight_max_s = 1.0;          ///< Longest flight of a jump.
+  /// Maximum time between the swing and the start or end of a step, while both feet stand.
+  double standing_max_s = 0.4;
+  double swing_min_s = 0.1;           ///< Minimum duration of a swing.
+  double swing_max_s = 2.0;           ///< Maximum duration of a swing.
+  double moved_min_m = 0.04;          ///< In a step, the foot moves by at least this distance, or
+  double turned_min_rad = 0.09;       ///< it turns by at least this angle.
+  double support_slide_max_m = 0.12;  ///< Maximum motion of the other foot's ball during a swing.
+  double flight_min_s = 0.15;         ///< Minimum duration of the flight of a jump.
+  double flight_max_s = 1.0;          ///< Maximum duration of the flight of a jump.
   double feet_apart_max_s = 0.15;     ///< In a jump, both feet leave and land within this time.
-  /// Steps that end less than this before the figure hangs on something are rejected.
+  /// Steps that end less than this before the figure hangs by its arms are rejected.
   double reaching_s = 0.7;
-  /// Steps that start less than this after the figure has let go are rejected.
+  /// Steps that start less than this after the figure has stopped hanging are rejected.
   double letting_go_s = 1.0;
   double still_m_s = 0.1;  ///< The figure stands still if its pelvis is slower than this.
 };
@@ -52,7 +53,7 @@ struct JumpSegment {
   int after_contact[2] = {0, 0};   ///< Indices of the contacts after the flight, by foot.
 };
 
-/// A range of frames that looked like a movement but is not usable.
+/// A range of frames that resembles a movement but is not usable.
 struct RejectedSpan {
   FrameRange frames;
   std::string reason;

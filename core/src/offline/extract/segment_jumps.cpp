@@ -18,35 +18,38 @@
 namespace stridewire {
 namespace {
 
-// Acceleration of a falling pelvis. In captured jumps it is -9.5 to -11.8 m/s^2, since arms and
-// legs swing. For a figure that hangs on a bar it is near 0.
+// Minimum acceleration of a falling pelvis. In captured jumps it is -9.5 to -11.8 m/s^2, because
+// arms and legs swing. For a figure that hangs on a bar it is near 0.
 constexpr double kFallMin_m_s2 = -15.0;
 constexpr double kFallMax_m_s2 = -5.0;
 constexpr double kGravity_m_s2 = -9.81;
-// If the pelvis follows a parabola at another acceleration than that of a fall, the frame rate is
-// probably wrong. The parabola must be at least kArchMinM high, with deviations below
+// If the pelvis follows a parabola, but not with the acceleration of a free fall, the frame rate is
+// probably wrong. The parabola must be at least kArchMinM high. Deviations must be below
 // kArchResidualShare of its height.
 constexpr double kArchMinM = 0.02;
 constexpr double kArchResidualShare = 0.05;
-// A figure that hangs on something swings at most this fast and has raised its feet this far.
+// A figure that hangs by its arms swings at most this fast and has raised its feet at least this
+// far.
 constexpr double kHangMax_m_s = 1.5;
 constexpr double kHangRiseM = 0.03;
 // A runner moves at least this fast and is in the air for at least this time.
 constexpr double kRunMin_m_s = 1.0;
 constexpr double kRunFlightMinS = 0.04;
-// A runner's other foot has left the ground at least this time before the flight.
+// The other foot of a runner leaves the ground at least this time before the flight.
 constexpr double kRunFeetApartS = 0.1;
-constexpr double kPastLowestM = 0.03;  // After this rise, the pelvis has passed its lowest point.
-constexpr double kNextCrouchM = 0.05;  // A later descent by this much begins the next crouch.
-constexpr double kUprightShare = 0.6;  // A standing figure has risen by this share of the crouch.
+// If the pelvis has risen by this much, it has passed its lowest point.
+constexpr double kPastLowestM = 0.03;
+constexpr double kNextCrouchM = 0.05;  // If it then descends by this much, the next crouch begins.
+// A standing figure has risen from the crouch by at least this fraction of its depth.
+constexpr double kUprightShare = 0.6;
 // A standing figure may move at up to this many times still_m_s.
 constexpr double kNearlyStill = 2.5;
-constexpr double kUnsettledMinS = 0.1;  // Shortest usable support after landing.
+constexpr double kUnsettledMinS = 0.1;  // Minimum duration of a usable support after landing.
 
 // A parabola through the heights of the pelvis.
 struct Fall {
   double acceleration_m_s2 = 0.0;
-  double residual_m = 0.0;  // Root of the mean squared deviation from the parabola.
+  double residual_m = 0.0;  // Root mean square deviation from the parabola.
 };
 
 Fall FitFall(const BodyTracks& tracks, const FrameRange& flight) {
@@ -63,7 +66,8 @@ Fall FitFall(const BodyTracks& tracks, const FrameRange& flight) {
   return {2.0 * fit(2), (a * fit - y).norm() / std::sqrt(static_cast<double>(n))};
 }
 
-// Returns a usual frame rate if one is within 3 % of the measured rate, otherwise the rounded rate.
+// Returns a common frame rate if one is within 3 % of the measured rate. Otherwise, returns the
+// rounded rate.
 double PlausibleRate(double fps) {
   for (const double usual : {24.0, 25.0, 30.0, 50.0, 60.0, 90.0, 100.0, 120.0, 200.0, 240.0}) {
     if (std::fabs(fps - usual) < 0.03 * usual) return usual;
@@ -85,11 +89,12 @@ bool IsFreeFall(double acceleration_m_s2) {
 struct Standing {
   int lowest = 0;
   int still = 0;
-  double speed_m_s = 0.0;  // Speed at `still`.
+  double speed_m_s = 0.0;  // Speed of the pelvis in frame `still`.
 };
 
-// Searches from an edge of the flight away from it (direction -1: before, +1: after) up to `last`
-// for the lowest point of the pelvis, and then for the first moment when it is still and upright.
+// Searches from an edge of the flight away from it (direction -1: before, +1: after), up to `last`.
+// First finds the lowest point of the pelvis, and then the first frame in which it is still and
+// upright.
 Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int last,
                       double still_m_s) {
   const auto height = [&](int i) { return tracks.pelvis_m[static_cast<std::size_t>(i)].y; };
@@ -103,7 +108,7 @@ Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int las
       break;
     }
   }
-  // Stops where the pelvis sinks again, which is the crouch of another jump.
+  // Stops where the pelvis descends again, because another jump begins there.
   double highest = height(standing.lowest);
   for (int k = standing.lowest; k != last + direction; k += direction) {
     highest = std::max(highest, height(k));
@@ -141,7 +146,7 @@ bool FeetRise(const BodyTracks& tracks, const FrameRange& flight) {
   return false;
 }
 
-// Describes a flight in which the pelvis does not fall with 9.81 m/s^2.
+// Describes a flight in which the acceleration of the pelvis is not that of gravity.
 JumpFinding WrongFall(const Fall& fall, const FrameRange& flight, const BodyTracks& tracks) {
   const double seconds = flight.size() / tracks.fps;
   const double fall_m_s2 = -fall.acceleration_m_s2;
@@ -187,7 +192,7 @@ bool FallsFreely(const BodyTracks& tracks, const FrameRange& flight) {
 }
 
 bool IsRun(const BodyTracks& tracks, const FootContacts& contacts, const FrameRange& flight) {
-  // A flight of n frames may last half a frame longer.
+  // The true duration of a flight of n frames may be half a frame longer.
   if (flight.size() + 0.5 < kRunFlightMinS * tracks.fps) return false;
   if (TravelSpeed(tracks, flight) < kRunMin_m_s) return false;
   // A foot takes part in the take-off if it stands shortly before the flight.

@@ -15,15 +15,17 @@ namespace {
 
 constexpr double kWindowS = 0.1;  // Speeds are averaged over this time to reduce noise.
 constexpr double kSameGroundM = 0.03;
-// Penalties that are added to the mean joint speed in m/s.
+// The following penalties are added to the mean joint speed in m/s.
+//
 // Penalty per metre by which one foot is in front of the other.
 constexpr double kStridePerM = 2.0;
 // Penalty per metre by which the pelvis is lower than in usual standing.
 constexpr double kCrouchPerM = 4.0;
-// Penalty per metre by which the pelvis is not above the feet, or the head not above the pelvis.
+// Penalty per metre of horizontal distance between the pelvis and the feet, and between the head
+// and the pelvis.
 constexpr double kLeanPerM = 2.0;
-// Penalty per metre by which ankle and tip of the toes are not as high above the ball as in a flat
-// foot. Smaller deviations than kFlatM do not count.
+// Penalty per metre by which the heights of ankle and toe tip above the ball differ from those of a
+// flat foot. Deviations below kFlatM are ignored.
 constexpr double kTiltPerM = 4.0;
 constexpr double kFlatM = 0.015;
 
@@ -34,8 +36,9 @@ double StandHeight(const BodyTracks& tracks) {
   return Percentile(std::move(heights), 75.0);
 }
 
-// Returns the deviation from an upright posture, with the pelvis above the ankles and the highest
-// joint above the pelvis. Still moments may also be a crouch before a jump or a reach for a bar.
+// Returns the deviation from an upright posture, in which the pelvis is above the ankles and the
+// highest joint is above the pelvis. People are also still in a crouch before a jump, or while they
+// reach for a bar.
 double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   const DVec3 pelvis(positions[0]);
   const auto at = [&](int joint) { return DVec3(positions[static_cast<std::size_t>(joint)]); };
@@ -46,7 +49,7 @@ double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   return HorizontalDistance(pelvis, ankles) + HorizontalDistance(DVec3(*top), pelvis);
 }
 
-// Returns how far a foot is from being flat. Figures may also be still on their heels or toes, for
+// Returns how far a foot is from being flat. People are also still on their heels or toes, for
 // example after a fall.
 double Tilt(const FootPaths& foot, int frame) {
   double tilt_m = 0.0;

@@ -8,9 +8,9 @@
 
 namespace stridewire {
 
-/// Returns the stillest moment of a clip with both feet on the same ground, side by side, and
-/// straight legs. `heading_rad` is the stride heading per frame of the tracks. Returns nullopt if
-/// both feet never stand.
+/// Returns the stillest moment of a clip in which both feet are side by side on the same ground and
+/// the legs are straight. `heading_rad` is the stride heading per frame of the tracks. Returns
+/// nullopt if both feet never stand.
 [[nodiscard]] std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip& clip,
                                                          const BodyTracks& tracks,
                                                          const FootContacts& contacts,

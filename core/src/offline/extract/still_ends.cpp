@@ -8,9 +8,9 @@
 namespace stridewire {
 namespace {
 
-constexpr double kStillM = 0.005;  // Joints of a still pose move at most this far per frame.
-// The pose jumps between two frames if a joint moves at least kJumpM, and at least kJumpFactor
-// times as far as from the second of these frames to the next.
+constexpr double kStillM = 0.005;  // Maximum motion of a joint per frame in a still pose.
+// The pose jumps between two frames if a joint moves at least kJumpM. It must also move at least
+// kJumpFactor times as far as between the second of these frames and the next one.
 constexpr double kJumpM = 0.05;
 constexpr double kJumpFactor = 4.0;
 
@@ -42,8 +42,8 @@ class PoseSteps {
   std::vector<Quat> rotations_;
 };
 
-// Returns the first frame after the jump that ends a still pose at `begin`, or `begin` if there is
-// no such jump before `end`. With direction -1, frames are counted backward.
+// Returns the first frame after a still pose that starts at `begin` and ends with a jump. Returns
+// `begin` if there is no such jump before `end`. With direction -1, counts frames backward.
 int SkipStillPose(PoseSteps& steps, int begin, int end, int direction) {
   for (int i = begin; i != end && i + direction != end && i + 2 * direction != end;
        i += direction) {

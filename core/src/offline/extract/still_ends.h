@@ -6,9 +6,9 @@
 
 namespace stridewire {
 
-/// Returns the frames of a clip from `first_frame` without still poses at either end that are cut
-/// to the motion with a jump, for example a T-pose of one second before a walk. A figure that
-/// stands still and then starts to move is part of the motion.
+/// Returns the frames of a clip from `first_frame` on, without still poses at its ends that are
+/// separated from the motion by a jump, for example a T-pose of one second before a walk. A figure
+/// that stands still and then starts to move is part of the motion.
 [[nodiscard]] FrameRange WithoutStillEnds(const Skeleton& skeleton, const Clip& clip,
                                           int first_frame);
 

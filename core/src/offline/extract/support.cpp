@@ -14,25 +14,28 @@ namespace {
 
 // Shorter contacts may be slow moments within swings and jumps.
 constexpr double kLongContactS = 0.3;
-constexpr double kFreeFallM_s2 = -5.0;  // A figure whose pelvis accelerates like this is falling.
-// The pelvis of a standing figure is at least this share of the leg length above the foot.
+// If the vertical acceleration of the pelvis is below this, the figure is falling.
+constexpr double kFreeFallM_s2 = -5.0;
+// The pelvis of a standing figure is above the foot by at least this fraction of the leg length.
 constexpr double kPelvisAboveShare = 0.3;
 // The other foot may be this much lower while it swings past the standing foot.
 constexpr double kSwingBelowM = 0.03;
-// Shortest time for which a foot carries the figure alone, or stands as low as the other one.
+// Minimum time for which a foot must carry the figure alone, or be as low as the other foot.
 constexpr double kAloneMinS = 0.05;
-constexpr double kAsLowM = 0.05;  // A foot at most this much above the other one is on its level.
-// A higher foot carries weight if it is still for this time, with the pelvis at least this share of
-// the way from the lower to the higher foot.
+// A foot counts as low if it is at most this much above the other one.
+constexpr double kAsLowM = 0.05;
+// A higher foot carries weight if it is still for kLoadMinS and if the pelvis is at least
+// kLoadShare of the way from the lower to the higher foot.
 constexpr double kLoadMinS = 0.1;
 constexpr double kLoadShare = 0.35;
 constexpr double kStandingStillM_s = 0.15;
-constexpr double kHeldMinS = 0.1;  // In shorter flights, the acceleration of the pelvis is noise.
+// In shorter flights, the acceleration of the pelvis is only noise.
+constexpr double kHeldMinS = 0.1;
 // If the feet are closer than this, the pelvis does not indicate which one carries the weight.
 constexpr double kFeetApartMinM = 0.3;
 
-// Returns the mean vertical acceleration of the pelvis over a range of frames. It follows from the
-// mean heights in the three thirds of the range, whose second difference is less noisy.
+// Returns the mean vertical acceleration of the pelvis over a range of frames. It is the second
+// difference of the mean heights in the three thirds of the range, which reduces noise.
 double VerticalAcceleration(const BodyTracks& tracks, const FrameRange& range) {
   const int third = std::max(1, range.size() / 3);
   if (range.size() < 3 * third) return 0.0;
@@ -125,7 +128,7 @@ struct StandingSpan {
   FrameRange frames;
   double first_m = 0.0;   // Ball height of the first contact.
   double last_m = 0.0;    // Ball height of the contact that ends last.
-  double lowest_m = 0.0;  // Smallest ball height of all contacts.
+  double lowest_m = 0.0;  // Minimum ball height of all contacts.
 };
 
 std::vector<StandingSpan> StandingSpans(const FootContacts& contacts) {
@@ -149,15 +152,15 @@ std::vector<StandingSpan> StandingSpans(const FootContacts& contacts) {
   return spans;
 }
 
-// Returns true if the figure is in the air between two spans but does not fall freely: something
-// that was not captured carries it.
+// Returns true if the figure is in the air between two spans but does not fall freely, because
+// something that was not captured carries it.
 bool IsHeldBetween(const BodyTracks& tracks, const StandingSpan& from, const StandingSpan& to) {
   const FrameRange flight{from.frames.end, to.frames.begin};
   return flight.size() >= kHeldMinS * tracks.fps && !FallsFreely(tracks, flight);
 }
 
-// Removes contacts of feet that hang in the air. Such contacts are higher than those before and
-// after them, and the figure is carried on the way there and back.
+// Removes contacts of feet that hang in the air. They are higher than the contacts before and after
+// them, and the figure does not fall freely on the way there and back.
 void RemoveHanging(const BodyTracks& tracks, FootContacts& contacts) {
   const std::vector<StandingSpan> spans = StandingSpans(contacts);
   for (std::size_t k = 1; k + 1 < spans.size(); ++k) {

@@ -4,16 +4,16 @@
 
 namespace stridewire {
 
-/// Removes the contacts during which a foot cannot carry the figure, for example because it hovers.
-/// A contact remains if the pelvis is above the foot, the figure is not in free fall, and one of
-/// these holds:
+/// Removes contacts in which a foot cannot carry the figure, for example because it hovers. A
+/// contact remains if the pelvis is above the foot, the figure is not in free fall, and one of
+/// these conditions holds:
 ///
-/// - the other foot is in the air above it for a while, so this foot stands alone;
-/// - the foot is as low as the other one for a while, which stands as well;
-/// - the pelvis is so far between both feet that this foot must carry a part of the weight.
+/// - The other foot is higher for a while, so this foot carries the figure alone.
+/// - The foot is as low as the other foot, which stands as well, for a while.
+/// - The pelvis is so close to this foot that the foot must carry a part of the weight.
 ///
-/// Feet that leave the ground without a fall and come to rest above the floor hang in the air, for
-/// example below a bar. Their contacts are removed, too.
+/// If feet leave the ground without a fall and come to rest above the floor, the figure hangs, for
+/// example by its arms from a bar. These contacts are removed as well.
 void RemoveUnsupported(const BodyTracks& tracks, const ContactOptions& options,
                        FootContacts& contacts);
 
