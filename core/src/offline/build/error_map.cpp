@@ -14,7 +14,7 @@
 namespace stridewire {
 namespace {
 
-// Points this close to the hull count as inside, in scaled parameters.
+// Points outside the hull by at most this distance, in scaled parameters, count as inside.
 constexpr double kInside = 1e-6;
 
 std::vector<double> Axis(const Parameter& parameter, int count) {

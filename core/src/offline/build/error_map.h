@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-/// Selects the slice of the parameter space of a group that a map covers. One or two parameters
-/// vary, given by index; the others are constant, see ErrorMap::others.
+/// Selects a slice of the parameter space of a group. One or two parameters vary and are given by
+/// index. The others are constant (ErrorMap::others).
 struct ErrorMapOptions {
   int axis_x = 0;
   int axis_y = -1;   ///< Index of the parameter on the second axis; -1: only one parameter varies.
@@ -19,19 +19,20 @@ struct ErrorMapOptions {
 };
 
 /// The error e(p) = |p - a(p)| on a grid over a slice of the parameter space of a group (paper,
-/// Figure 1). The grid spans the range of the examples. Values outside their hull are NaN.
+/// Figure 1). The grid covers the range of the examples. Values outside their hull are NaN.
 struct ErrorMap {
-  /// Values of the parameters on the two axes, by column and by row.
+  /// Values of the two varying parameters, by column and by row.
   std::vector<double> x, y;
   std::vector<double> others;      ///< Values of the constant parameters, by parameter.
   std::vector<double> error_m;     ///< [row][column]: error without weight correction.
   std::vector<double> weight_sum;  ///< [row][column]: sum of |w|.
-  double max_error_m = 0.0;        ///< Largest error on the map; the group may have larger ones.
+  /// Largest error on the map. The group may have larger errors elsewhere.
+  double max_error_m = 0.0;
 };
 
 /// Measures an error map. Each parameter without an axis has its mean value over the examples. Uses
-/// all processors; the result does not depend on their number. Error: kOutOfRange for an option or
-/// the group.
+/// all processors; the result does not depend on their number. Fails with kOutOfRange if an option
+/// is out of range or the group does not exist.
 [[nodiscard]] Expected<ErrorMap> MeasureErrorMap(const MotionLibrary& library, int group_index,
                                                  const ErrorMapOptions& options = {});
 

@@ -25,7 +25,7 @@ std::vector<std::vector<int>> CompleteLinkage(const std::vector<GridExample>& ex
   const std::size_t n = examples.size();
   STRIDEWIRE_CHECK(diameter >= 0.0);
   std::vector<std::vector<int>> clusters(n);
-  // Distance between two clusters: that of their most distant members.
+  // [cluster][cluster]: distance of the most distant members of two clusters.
   std::vector<double> distance(n * n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
     clusters[i] = {static_cast<int>(i)};
@@ -93,8 +93,8 @@ GridExample AverageExamples(const std::vector<GridExample>& examples, std::span<
       const std::size_t at = begin + 4 * j;
       double* q = &rows[at];
       const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-      // If the rotations cancel each other, their mean is undefined, so use those of the first
-      // member.
+      // If the rotations cancel each other out, their mean is undefined. The rotation of the first
+      // member is used instead.
       if (norm < 0.1) {
         for (std::size_t c = 0; c < 4; ++c) {
           q[c] = examples[static_cast<std::size_t>(members[0])].rows[at + c];

@@ -8,14 +8,14 @@
 
 namespace stridewire {
 
-// Clusters examples by complete linkage: it repeatedly merges the two clusters whose most distant
-// members are nearest. Within a cluster all parameters, multiplied by `units`, lie within
-// `diameter` of each other. Clusters and their members are sorted by index.
+// Clusters examples by complete linkage: repeatedly merges the two clusters whose most distant
+// members are closest to each other. Within a cluster, all parameters differ by at most `diameter`
+// after multiplication by `units`. Clusters and their members are sorted by index.
 [[nodiscard]] std::vector<std::vector<int>> CompleteLinkage(
     const std::vector<GridExample>& examples, std::span<const double> units, double diameter);
 
-// Averages examples at equal generic times, including their keytimes. The examples must have
-// aligned hemispheres. The parameters of steps are measured again on the result; those of jumps are
+// Averages the poses of examples at equal generic times, and their keytimes. The examples must have
+// aligned hemispheres. The parameters of steps are measured again on the result. Those of jumps are
 // averaged.
 [[nodiscard]] GridExample AverageExamples(const std::vector<GridExample>& examples,
                                           std::span<const int> members, const GridLayout& layout,

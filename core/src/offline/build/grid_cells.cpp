@@ -13,7 +13,7 @@ namespace stridewire {
 namespace {
 
 constexpr int kMinCells = 2;
-// Limit per interval. kMaxIntervals times this number fits into the grid.
+// Limit per interval. The grid has room for kMaxIntervals times this number.
 constexpr int kMaxCells = 400;
 constexpr double kGrowth = 1.15;
 constexpr int kMaxRounds = 20;
@@ -38,12 +38,12 @@ IntervalLength LengthOf(const RawGroup& group, std::size_t interval) {
   return length;
 }
 
-// Returns the error of the stored example per interval: the mean over joints and time, in radians.
+// Returns the error of the stored example for each interval: the mean over joints and time, in
+// radians.
 std::vector<double> StoredErrors(const RawExample& example, const std::vector<int>& cells,
                                  const GridLayout& layout, const Quat& stand_root) {
   const GridExample stored = ResampleOnGrid(example, cells, layout, stand_root);
-  // Puts each example into a group of its own, so that the error is measured with the code that
-  // plays it.
+  // A group with only this example, so that the code that plays examples also measures the error.
   MotionGroup alone;
   alone.example_count = 1;
   alone.cells = cells;
@@ -92,12 +92,12 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
     cells[i] = cells_at(length.mean_s, fps);
     most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
   }
-  // Cells are only ever added, so an example whose error is small is not measured again.
+  // Cells are added but never removed, so an example whose error is small is not measured again.
   std::vector<const RawExample*> rough;
   for (const RawExample& example : group.examples) rough.push_back(&example);
   for (int round = 0; round < kMaxRounds; ++round) {
-    // If the mean error of an example is too large, add cells to those of its intervals whose error
-    // is above the mean.
+    // If the mean error of an example is too large, adds cells to its intervals with an error above
+    // that mean.
     std::vector<bool> grows(intervals, false);
     std::erase_if(rough, [&](const RawExample* example) {
       const std::vector<double> errors = StoredErrors(*example, cells, layout, stand_root);

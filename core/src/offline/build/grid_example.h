@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-// An example resampled on the generic-time grid of its group. GridLayout defines the rows.
+// An example that was resampled on the generic-time grid of its group. GridLayout defines the rows.
 struct GridExample {
   std::vector<float> rows;  // [grid point][row_floats]
   std::vector<double> keytimes_s;
@@ -19,22 +19,24 @@ struct GridExample {
 };
 
 // Samples an example at the grid points, using its own keytimes. `stand_root` is the rotation of
-// the root in the stand pose, where its heading is 0. The axes of the root's frame do not matter.
+// the root in the stand pose, in which the heading is 0. It compensates for the axes of the root's
+// frame.
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                                          const GridLayout& layout, const Quat& stand_root);
 
-// Makes the rotation tracks of each joint continuous in sign, and then flips whole tracks into the
-// hemisphere of a reference: the example nearest to the mean parameters. Flipping single points
-// would make tracks jump that turn by 180 degrees away from the reference, and with them the
-// interpolated blend. A reference that depends on the weights would have the same effect.
+// Makes the quaternions of each joint continuous in sign over time. Then negates whole tracks,
+// where necessary, so that they are in the hemisphere of a reference: the example nearest to the
+// mean parameters. If single points were negated instead, tracks that rotate by 180 degrees away
+// from the reference would jump, and with them the interpolated blend. A reference that depends on
+// the weights would have the same effect.
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count);
 
-// Sets a row to a weighted sum of rows with normalised rotations. Rotations that cancel each other
-// keep their previous value in `row`.
+// Sets a row to a weighted sum of rows with normalised rotations. If rotations cancel each other
+// out, the row keeps its previous value.
 void SetBlendedRow(std::span<const float> sum, const GridLayout& layout, float* row);
 
-// Returns the pose of a row, with root position and yaw applied.
+// Converts a row to a pose, with root position and yaw applied.
 [[nodiscard]] Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count);
 
 }  // namespace stridewire

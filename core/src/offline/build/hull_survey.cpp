@@ -15,15 +15,15 @@ namespace stridewire {
 namespace {
 
 constexpr int kPeaks = 8;
-// Minimum distance between the starting points of climbs, in scaled parameters.
+// Minimum distance between the starting points of ascents, in scaled parameters.
 constexpr double kPeakDistance = 0.3;
 constexpr int kClimbRounds = 24;
 constexpr double kSlopeStep = 1e-3;  // Scaled.
 constexpr double kFirstStride = 0.1;
 constexpr double kLastStride = 2e-3;
 
-// Returns a uniform random number in (0, 1). The standard distributions are not used, because they
-// differ between C++ libraries.
+// Returns a uniform random number in (0, 1). The distributions of the standard library are not
+// used, because they differ between implementations.
 double Uniform(std::mt19937& random) {
   return (static_cast<double>(random()) + 0.5) / 4294967296.0;
 }
@@ -79,9 +79,9 @@ std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples, s
   }
   std::vector<double> share(n);
   for (int s = 0; s < samples; ++s) {
-    // Uses a Dirichlet distribution with alpha = 1/2, so that few examples dominate a sample. Every
-    // other sample mixes only two to d + 1 examples. Otherwise samples of large groups would hardly
-    // reach the edges, where errors are often largest.
+    // Uses a Dirichlet distribution with alpha = 1/2, so that few examples dominate each sample.
+    // Every other sample mixes only two to d + 1 examples. Otherwise, samples of large groups would
+    // hardly reach the edges, where errors are often largest.
     std::fill(share.begin(), share.end(), 0.0);
     const bool takes_all = s % 2 == 0;
     const std::size_t count = takes_all ? n : 2 + static_cast<std::size_t>(s / 2) % d;

@@ -12,12 +12,12 @@
 
 namespace stridewire {
 
-// Samples the hull of the examples of a group. The examples come first, followed by convex
+// Samples the hull of the examples of a group. Returns the examples first, and then convex
 // combinations: half of them of all examples, half of a few examples, to reach faces and corners.
 [[nodiscard]] std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples,
                                                       std::uint32_t seed);
 
-// The properties of a group at one point of its parameter space.
+// Properties of a group at one point of its parameter space.
 struct HullPoint {
   ParameterValues p;
   double error_m = 0.0;     // e(p) = |p - a(p)|
@@ -34,7 +34,7 @@ class GroupProbe {
   [[nodiscard]] Correction Correct(const MotionGroup& group, const ParameterValues& wanted,
                                    const CorrectionLimits& limits);
 
-  // Returns the weights [n] that the last call of Correct has computed.
+  // Returns the weights [n] that the last call of Correct computed.
   [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) {
     return scratch_.weights(group);
   }
@@ -57,13 +57,14 @@ struct HullSurvey {
   double mean_m = 0.0;  // Mean error over the samples.
   double max_m = 0.0;
   double weight_sum_max = 0.0;
-  std::vector<HullPoint> points;  // Measurements at the samples, one per sample.
-  std::vector<HullPoint> peaks;   // Local maxima found from the worst samples, largest first.
+  std::vector<HullPoint> points;  // [sample]: measurements.
+  // Local maxima found by ascent from the worst samples, largest first.
+  std::vector<HullPoint> peaks;
 };
 
-// Evaluates all samples and climbs from the worst ones by steepest ascent inside the hull. The
-// starting points have a minimum distance from each other. Uses one thread per probe; the result
-// does not depend on their number.
+// Evaluates all samples, and then follows the steepest ascent inside the hull from the worst ones.
+// The starting points have a minimum distance from each other. Uses one thread per probe; the
+// result does not depend on their number.
 [[nodiscard]] HullSurvey SurveyHull(const MotionGroup& group,
                                     std::span<const ParameterValues> samples,
                                     std::span<GroupProbe> probes);

@@ -19,12 +19,12 @@ struct InterpolationError {
   double corrected_in_3_max_m = 0.0;
   double corrected_weight_sum_max = 0.0;  ///< Largest sum of |w| after correction.
   double weight_sum_max = 0.0;            ///< Largest sum of |w| without correction.
-  int samples = 0;                        ///< Number of points for the means.
-  int iterations = 0;                     ///< Limit on the iterations of a correction.
+  int samples = 0;                        ///< Number of samples over which the means are computed.
+  int iterations = 0;                     ///< Maximum number of iterations of a correction.
 };
 
 /// Measures the error at the examples, at random convex combinations (see SampleHull), and at the
-/// peaks found by steepest ascent from the worst of them. Uses all processors; the result does not
+/// peaks found by steepest ascent from the worst of these. Uses all processors; the result does not
 /// depend on their number.
 [[nodiscard]] InterpolationError MeasureInterpolationError(const MotionLibrary& library,
                                                            int group_index, int samples = 1000,

@@ -25,7 +25,8 @@ std::vector<int> ChildrenOf(const Skeleton& skeleton, int joint,
   return children;
 }
 
-// Returns the trunk: the longest chain of joints up from the root until arms and head branch off.
+// Returns the trunk: the longest chain of joints from the root up to the joint where arms and head
+// branch off.
 std::vector<int> TrunkOf(const Skeleton& skeleton, const std::vector<bool>& of_legs) {
   std::vector<int> trunk;
   for (int j = 0; j < skeleton.joint_count(); ++j) {
@@ -124,7 +125,7 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
   }
   const double from_s = cut.from_s.value_or(capture.first_frame / capture.clip.fps);
   const double to_s = cut.to_s.value_or(capture.clip.duration_s());
-  // Tolerates times that were rounded to two decimals.
+  // Allows for times that were rounded to two decimals.
   if (!(from_s >= 0.0 && to_s <= capture.clip.duration_s() + 0.01)) {
     return Fail(ErrorCode::kOutOfRange, "the times are outside the capture", where);
   }
@@ -146,7 +147,7 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
   layer.clip.Resize(intervals + 1, skeleton.joint_count());
   Pose tail(skeleton.joint_count());
   for (int f = 0; f <= intervals; ++f) {
-    // The last frame of a loop equals the first, where the blend begins.
+    // The last frame of a loop equals its first frame, where the blend begins.
     const double time_s = cut.is_looping && f == intervals ? 0.0 : f / layer.clip.fps;
     PoseSpan frame = layer.clip.frame(f);
     SampleClip(capture.clip, from_s + time_s, frame);

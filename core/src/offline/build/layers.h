@@ -15,40 +15,44 @@
 
 namespace stridewire {
 
-/// Approximate number of keys per second; a loop contains a whole number of them.
+/// Approximate number of keys per second. It is adjusted so that a loop contains a whole number of
+/// keys.
 inline constexpr double kLayerKeysPerSecond = 30.0;
-inline constexpr double kLoopBlendS = 0.4;  ///< Longest blend that closes a captured loop.
+/// Maximum duration of the blend that closes a captured loop.
+inline constexpr double kLoopBlendS = 0.4;
 
 /// Returns the default mask of layers, one weight per joint: 0 for the root and the legs, 1 for the
-/// upper body. On the n joints of the trunk below arms and head the weights rise evenly, k / (n +
-/// 1) for the k-th joint, so that the lean of a clip is distributed over the spine.
+/// upper body. Along the n joints of the trunk below arms and head, the weights rise evenly: k / (n
+/// + 1) for the k-th joint. This distributes the lean of a clip over the spine.
 [[nodiscard]] std::vector<float> UpperBodyMask(const Skeleton& skeleton);
 
 /// Returns a mask with weight 1 for the named joints and all joints below them. Errors, with the
-/// name in `where`: kNotFound if the joint does not exist, kInvalidArgument for the root or a joint
-/// above a leg.
+/// name in Error::where: kNotFound if the joint does not exist, kInvalidArgument for the root or a
+/// joint above a leg.
 [[nodiscard]] Expected<std::vector<float>> MaskOfJoints(const Skeleton& skeleton,
                                                         std::span<const std::string> names);
 
-/// The part of a capture that becomes a layer, and how it plays.
+/// The part of a capture that becomes a layer, and how it is played.
 struct LayerCut {
   std::string name;
-  /// Start of the cut. Empty: the first usable frame of the capture.
+  /// Start of the cut. nullopt: the first usable frame of the capture.
   std::optional<double> from_s;
-  std::optional<double> to_s;  ///< End of the cut. Empty: the end of the capture.
+  std::optional<double> to_s;  ///< End of the cut. nullopt: the end of the capture.
   bool is_looping = true;
 };
 
 /// Cuts a layer out of a capture. The mask is UpperBodyMask(). To close a loop, its end is blended
 /// into its beginning. The blend lasts kLoopBlendS, or a quarter of the cut if that is shorter, and
-/// shortens the loop by this time. Errors, with details in `where`: kShapeMismatch if the joints
-/// differ from the skeleton, kInvalidArgument for an invalid name, kOutOfRange for times outside
-/// the capture or a cut shorter than 0.1 s.
+/// shortens the loop by this time.
+///
+/// Errors, with details in Error::where: kShapeMismatch if the joints differ from the skeleton,
+/// kInvalidArgument for an invalid name, kOutOfRange for times outside the capture or a cut shorter
+/// than 0.1 s.
 [[nodiscard]] Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton,
                                           const LayerCut& cut);
 
 /// Converts layers to the form in which a library stores them: resampled to about
-/// kLayerKeysPerSecond, with the masked joints only.
+/// kLayerKeysPerSecond, and with the masked joints only.
 class StoredLayers {
  public:
   [[nodiscard]] std::span<const LayerClip> views() const { return views_; }
@@ -67,14 +71,14 @@ class StoredLayers {
   std::vector<LayerClip> views_;
 };
 
-/// Converts layers. Errors, with the layer in `where`: kInvalidArgument for an invalid or duplicate
-/// name or a mask that is empty or touches the root or a leg; kShapeMismatch; kOutOfRange;
-/// kLimitExceeded.
+/// Converts layers. Errors, with the layer in Error::where: kInvalidArgument for an invalid or
+/// duplicate name, and for a mask that is empty or contains the root or a leg; kShapeMismatch;
+/// kOutOfRange; kLimitExceeded.
 [[nodiscard]] Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers,
                                                  const Skeleton& skeleton);
 
-/// Returns a library with layers added; they replace layers with the same name. Errors: those of
-/// StoreLayers.
+/// Returns a library with additional layers. They replace layers with the same name. Errors: those
+/// of StoreLayers.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> AddLayers(
     const MotionLibrary& library, std::span<const RawLayer> layers);
 

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kSameSite = 1e-9;
 
-// All examples except one, with near duplicates averaged to sites.
+// All examples except one. Near duplicates are averaged into one site.
 struct Others {
   std::vector<int> examples;
   std::vector<std::vector<int>> clusters;
@@ -54,18 +54,18 @@ Others OthersOf(const MotionGroup& group, int left_out, double cluster_diameter_
   return others;
 }
 
-// A group whose sites are the other examples. It keeps the motion of all examples, but the weight
-// of the one that is left out is 0. Each site stands for a blend of examples, so a blend of sites
-// is a blend of examples as well.
+// A group whose sites are made of all examples except one. It stores the motion of all examples,
+// but the weight of the excluded one is 0. Each site stands for a blend of examples, so a blend of
+// sites is a blend of examples as well.
 struct GroupOfOthers {
   CardinalBasis basis;
   std::vector<double> linear;
   std::vector<double> radial;
-  MotionGroup group;  // The group. Its spans refer to the other members.
+  MotionGroup group;  // Its spans refer to the other members.
 };
 
-// Fits a group to sites. `shares` [site][example] is the blend of examples that each site
-// represents.
+// Fits a group to sites. Row `site` of `shares` [site][example] contains the weights of the
+// examples that the site stands for.
 std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<const double> sites,
                                          std::span<const double> shares, bool is_smooth) {
   const std::vector<double> scales = ScalesOf(original);
@@ -138,7 +138,7 @@ std::vector<double> NearestWeights(const MotionGroup& group, int left_out, std::
   return weights;
 }
 
-// Comparison of one left-out movement with its synthesis by one method.
+// Compares one excluded movement with its synthesis by one method.
 struct Comparison {
   bool is_valid = false;
   PoseError pose;
@@ -167,9 +167,9 @@ class Comparer {
         cache_(library.layout()),
         pose_(library.skeleton().joint_count()) {}
 
-  // Returns the weights [example] that an avatar would use: with parameters projected onto the hull
-  // of the others, and corrected. Empty if they cannot be solved. `products` is the result of
-  // MovementProducts.
+  // Returns the weights [example] that an avatar would use: for parameters projected onto the hull
+  // of the other examples, and corrected. Returns an empty vector if the weights cannot be solved.
+  // `products` is the result of MovementProducts.
   std::vector<double> CardinalWeights(const Others& others, std::span<const double> products,
                                       std::span<const double> wanted) {
     const auto smoothness = ChooseSmoothness(group_, others.examples, products);

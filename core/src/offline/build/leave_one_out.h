@@ -26,14 +26,15 @@ struct LeftOutMean {
   double pose_m = 0.0;  ///< Distance of joints at equal generic times.
   /// Distance of the joints of each part of the body.
   std::array<double, kBodyPartCount> part_m{};
-  double foot_m = 0.0;       ///< Distance of the ball of the moving foot; both feet in a jump.
-  double keytime_s = 0.0;    ///< Difference of keytimes, without the first.
-  double parameter_m = 0.0;  ///< Largest difference of a requested and a synthesized parameter.
+  double foot_m = 0.0;     ///< Distance of the ball of the moving foot, or of both balls in a jump.
+  double keytime_s = 0.0;  ///< Difference between keytimes, except the first.
+  /// Largest difference between a requested and a synthesized parameter.
+  double parameter_m = 0.0;
 };
 
 struct LeaveOneOut {
   int movements = 0;
-  /// Means of each method, indexed by BlendMethod.
+  /// Mean differences of each method, indexed by BlendMethod.
   std::array<LeftOutMean, kBlendMethodCount> means;
   /// Share of the movements for which kCardinal is nearer to the capture than this method, 0 to 1.
   std::array<double, kBlendMethodCount> wins{};

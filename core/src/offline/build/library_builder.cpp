@@ -85,8 +85,8 @@ ParameterRange RangeOf(const std::vector<GridExample>& examples, std::size_t l) 
   return range;
 }
 
-// Returns parameters with the ranges of the examples and their spreads as scales, but without
-// centres.
+// Returns parameters whose ranges are those of the examples and whose scales are the spreads of the
+// examples. Does not set the centres.
 std::vector<Parameter> ParametersOf(const RawGroup& group,
                                     const std::vector<GridExample>& examples) {
   std::vector<Parameter> parameters;
@@ -98,7 +98,7 @@ std::vector<Parameter> ParametersOf(const RawGroup& group,
   return parameters;
 }
 
-// Owns the numbers of a group, in the order in which a library stores them.
+// Owns the arrays of a group, in the order in which a library stores them.
 struct StoredGroup {
   CardinalBasis basis;
   std::vector<int> cells;
@@ -178,7 +178,7 @@ class GroupConverter {
   GroupConverter(const RawLibrary& raw, LibraryBuilder& builder)
       : raw_(raw), builder_(builder), layout_(raw.skeleton.joint_count()) {}
 
-  // Converts a group of the library, unless it has no examples.
+  // Converts a group of the library. Groups without examples are skipped.
   Status Add(std::size_t index) {
     const RawGroup& group = raw_.groups[index];
     if (group.examples.empty()) return {};
@@ -211,8 +211,7 @@ class GroupConverter {
     return examples;
   }
 
-  // Returns the examples to store. Sets `smoothness` if they are smooth functions of their
-  // parameters.
+  // Returns the examples to store. Sets `smoothness` if they were smoothed over their parameters.
   std::vector<GridExample> SelectExamples(const RawGroup& group, const std::vector<int>& cells,
                                           std::optional<Smoothness>& smoothness) {
     std::vector<GridExample> found = Resample(group, cells);
@@ -250,8 +249,8 @@ class GroupConverter {
     return examples;
   }
 
-  // Replaces `examples` by smooth functions of their parameters, which are fitted to all `found`
-  // examples.
+  // Smooths `examples` over their parameters: replaces the motion of each with the value, at its
+  // parameters, of smooth functions fitted to all examples in `found`.
   std::optional<Smoothness> Smooth(const RawGroup& group, const std::vector<GridExample>& found,
                                    const std::vector<int>& cells,
                                    std::vector<GridExample>& examples) const {
@@ -326,16 +325,16 @@ class GroupConverter {
   LibraryBuilder& builder_;
   GridLayout layout_;
   int index_ = 0;                                     // Index of the current group.
-  std::vector<std::unique_ptr<StoredGroup>> groups_;  // Owners of the data to which `views_` refer.
+  std::vector<std::unique_ptr<StoredGroup>> groups_;  // Own the data to which `views_` refer.
   std::vector<MotionGroup> views_;
 };
 
 }  // namespace
 
-// Averaging is necessary because captured steps with equal parameters differ by centimetres, so
-// weights would change abruptly between them. The error bound of 2.5 cm is a compromise: of subject
-// 16 it keeps a fifth of the straight and half of the general steps, and reproduces left-out steps
-// as well as all steps do. A bound of 4 cm reproduces them 5 to 10 % worse. The limit of five
+// Captured steps with equal parameters differ by centimetres. Without averaging, weights would
+// change abruptly between them. The error bound of 2.5 cm is a compromise: of subject 16, it keeps
+// one fifth of the straight and half of the general steps, and these reproduce left-out steps as
+// well as all steps do. A bound of 4 cm reproduces them 5 to 10 % worse. The outlier limit of five
 // deviations drops a recovery after a jump and the last step before a sharp turn. A limit of three
 // would also drop the first steps of walks.
 LibraryBuilder LibraryBuilder::Selecting() {

@@ -77,7 +77,7 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   if (content.groups.empty()) {
     return Fail(ErrorCode::kOutOfRange, "there are no examples to build a library from");
   }
-  // Grids make up nearly the whole library. If the buffer had to grow, it would copy them several
+  // Grids are nearly the whole library. If the buffer had to grow, it would copy them several
   // times.
   std::size_t size_estimate = 1 << 18;
   for (const MotionGroup& group : content.groups) {
@@ -109,8 +109,8 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   const auto groups_offset = builder.CreateVector(groups);
   std::vector<flatbuffers::Offset<fb::Layer>> layers;
   for (const LayerClip& layer : content.layers) layers.push_back(AddLayer(builder, layer));
-  // Omits the field if there are no layers, so that libraries without layers have the same bytes as
-  // before layers existed.
+  // Without layers, the field is omitted. The file then has the same bytes as one written before
+  // layers existed.
   const auto layers_offset = layers.empty() ? 0 : builder.CreateVector(layers);
   std::vector<fb::Transition> transitions;
   for (const Transition& t : FindTransitions(content)) {

@@ -9,7 +9,7 @@
 
 namespace stridewire {
 
-/// The content of a library, as views that the caller must keep alive.
+/// The contents of a library, as views that the caller must keep alive.
 struct LibraryContent {
   const Skeleton& skeleton;
   const Pose& stand_pose;
@@ -17,8 +17,9 @@ struct LibraryContent {
   std::span<const LayerClip> layers;
 };
 
-/// Writes the bytes of a library file and opens them again, which validates them. The same content
-/// gives the same bytes. Errors: kOutOfRange without groups, or those of MotionLibrary::FromBytes.
+/// Writes the bytes of a library file and opens them again, which validates them. Equal content
+/// gives equal bytes. Errors: kOutOfRange if there are no groups, and those of
+/// MotionLibrary::FromBytes.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(
     const LibraryContent& content);
 

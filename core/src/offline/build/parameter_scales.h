@@ -10,15 +10,14 @@
 
 namespace stridewire {
 
-// Returns the scales by which distances between parameters are measured, in the order of
-// parameters.
+// Returns the scales for distances between parameters, in the order of the parameters.
 [[nodiscard]] inline std::vector<double> ScalesOf(const MotionGroup& group) {
   std::vector<double> scales;
   for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
   return scales;
 }
 
-// Returns the inverse scales, the metric that ProjectOntoHull takes.
+// Returns the inverse scales, which ProjectOntoHull uses as its metric.
 [[nodiscard]] inline std::vector<double> MetricOf(const MotionGroup& group) {
   std::vector<double> metric;
   for (const Parameter& parameter : group.parameters) metric.push_back(1.0 / parameter.scale);
@@ -32,7 +31,7 @@ namespace stridewire {
   return values;
 }
 
-// Returns the scaled distance of two points. `a` and `b` may have more than d values.
+// Returns the scaled distance between two points. Ignores values after the first d.
 [[nodiscard]] inline double ScaledDistance(const MotionGroup& group, std::span<const double> a,
                                            std::span<const double> b) {
   double sum = 0.0;

@@ -40,7 +40,7 @@ std::string_view BodyPartName(BodyPart part) {
 std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton, ConstPoseSpan stand_pose) {
   const auto n = skeleton.joints.size();
   std::vector<BodyPart> parts(n, BodyPart::kTrunk);
-  // Joints between root and hip that carry only a leg belong to the trunk.
+  // Joints between root and hip that carry only a leg count as parts of the trunk.
   std::vector<bool> above_hip(n, false);
   for (const Leg& leg : skeleton.legs) {
     for (int j = leg.hip; j > 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
@@ -66,7 +66,7 @@ std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton, ConstPoseSpan stan
   for (std::size_t j = 1; j < n; ++j) {
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
     if (parts[j] != BodyPart::kTrunk || above_hip[j] || carries_arm[j]) continue;
-    // If the arms branch off at the root, its other children still belong to the trunk.
+    // If the arms branch off at the root, the other children of the root still belong to the trunk.
     if (parts[parent] == BodyPart::kHead || (parent != 0 && carries_arm[parent])) {
       parts[j] = BodyPart::kHead;
     }

@@ -20,10 +20,13 @@ inline constexpr int kBodyPartCount = 4;
 /// Returns "trunk", "head", "arms" or "legs".
 [[nodiscard]] std::string_view BodyPartName(BodyPart part);
 
-/// Returns the part of the body of each joint. Legs: the hips and all joints below them. Arms:
-/// other joints on one side, by FindMirrorJoints or else more than 3 cm from the root sideways in
-/// the stand pose. Head: joints in the middle above the joint where the arms branch off. Trunk:
-/// the rest.
+/// Returns the part of the body of each joint:
+///
+/// - Legs: the hips and all joints below them.
+/// - Arms: other joints that belong to one side, according to FindMirrorJoints. Without a mirror,
+///   those more than 3 cm from the root sideways in the stand pose.
+/// - Head: joints in the middle above the joint where the arms branch off.
+/// - Trunk: all other joints.
 [[nodiscard]] std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton,
                                                   ConstPoseSpan stand_pose);
 
@@ -35,15 +38,14 @@ struct PoseError {
   double max_m = 0.0;  ///< Largest distance of a joint.
 };
 
-/// Compares movements pose by pose. Both must be normalised: the root starts at x = z = 0 with
-/// heading 0. Poses are not aligned, so deviations of the root count. Borrows the skeleton. Not
-/// thread-safe.
+/// Compares movements pose by pose. Both must start with the root at x = z = 0 and heading 0. Poses
+/// are not aligned, so deviations of the root count. Borrows the skeleton. Not thread-safe.
 class PoseComparison {
  public:
   PoseComparison(const Skeleton& skeleton, ConstPoseSpan stand_pose);
 
-  /// Returns the distances of corresponding joints at equal generic times. Error: kShapeMismatch if
-  /// the numbers of poses or joints differ, or if there is no pose.
+  /// Returns the distances of corresponding joints at equal generic times. Fails with
+  /// kShapeMismatch if the numbers of poses or joints differ, or if there are no poses.
   [[nodiscard]] Expected<PoseError> Measure(std::span<const Pose> truth,
                                             std::span<const Pose> other);
 
@@ -56,15 +58,15 @@ class PoseComparison {
   std::vector<Quat> rotations_;
 };
 
-/// Samples a normalised clip at the grid points of a group, at the times that Eq. (3) gives for the
-/// keytimes of the clip. `cells[i]` is the number of cells of keytime interval i. `keytimes_s` must
+/// Samples a normalised clip at the grid points of a group. The times follow from the keytimes of
+/// the clip by Eq. (3). `cells[i]` is the number of cells of keytime interval i. `keytimes_s` must
 /// have one more value than `cells`.
 [[nodiscard]] std::vector<Pose> PosesAtGridPoints(const Clip& clip,
                                                   std::span<const double> keytimes_s,
                                                   std::span<const int> cells);
 
-/// Returns the poses of a blend with `weights` [n] at the grid points. It starts at the origin with
-/// heading 0.
+/// Returns the poses at the grid points of a blend with `weights` [n]. The blend starts at the
+/// origin with heading 0.
 [[nodiscard]] std::vector<Pose> PosesAtGridPoints(const MotionGroup& group,
                                                   const GridLayout& layout,
                                                   std::span<const double> weights);

@@ -15,14 +15,14 @@
 namespace stridewire {
 namespace {
 
-// Largest accepted error at a pseudoexample. Weights are floats, which limits positions of feet to
-// about 1 um.
+// Maximum error at a pseudoexample. Weights are floats, which limits the accuracy of foot positions
+// to about 1 um.
 constexpr double kMaxResidualM = 5e-6;
 constexpr CorrectionLimits kSolve = {.max_iterations = 40, .tolerance_m = 1e-6};
-// An improvement counts only if the largest error decreases by this share. Smaller changes are
-// noise of the survey.
+// The largest error must decrease by at least this fraction to count as an improvement. Smaller
+// changes are noise of the survey.
 constexpr double kMinGain = 1e-3;
-// Margin for points between the samples, where the sum of |w| may be larger.
+// Factor on the limit of the sum of |w| at the samples, because the sum may be larger between them.
 constexpr double kSampledWeightShare = 0.96;
 constexpr std::array kOwnRadiusFactors = {1.0, 1.5, 2.0, 0.7};
 constexpr std::uint32_t kOtherSeed = 0x9e3779b9;
@@ -38,11 +38,11 @@ struct Sites {
   std::vector<double> radius_factors;
 };
 
-// A group that has the motion of the library's group, but other sites and therefore other weights.
+// A group with the motion of the library's group, but with other sites and therefore other weights.
 struct Candidate {
   Sites sites;
   CardinalBasis basis;
-  MotionGroup group;  // The group. Its spans refer to `sites` and `basis`.
+  MotionGroup group;  // Its spans refer to `sites` and `basis`.
 };
 
 Expected<std::shared_ptr<const Candidate>> Fit(const MotionGroup& original, Sites sites,
@@ -110,10 +110,10 @@ struct Pass {
   // True if the pass also adds sites that increase the error, because later sites may reduce it
   // again.
   bool accepts_any = false;
-  bool tries_own_radii = true;  // Tries several radii for a new site.
+  bool tries_own_radii = true;  // True if the pass tries several radii for each new site.
 };
 
-// Passes in the order in which they are run, until one reaches the requested error.
+// Passes in the order in which they run. The first that reaches the requested error is the last.
 constexpr std::array kAmendedPasses = {
     Pass{}, Pass{RadiusRule::kAllSites, 1.0, true, false}, Pass{RadiusRule::kAllSites, 1.0, true},
     Pass{RadiusRule::kExamples, 2.0}, Pass{RadiusRule::kExamples, 3.0}};
@@ -159,7 +159,7 @@ class GroupRefiner {
         if (!wider) break;
         start = *wider;
         start_survey = SurveyHull(start->group, samples_, probes_);
-        // If this radius exceeds the limits, even wider radii exceed them as well.
+        // If this radius exceeds the limits, wider radii exceed them as well.
         if (!IsWithinBounds(start_survey, start->basis.condition)) break;
       }
       Expected<Outcome> outcome = RunPass(pass, std::move(start), std::move(start_survey));
@@ -179,7 +179,7 @@ class GroupRefiner {
       if (best.report.end == RefineEnd::kErrorReached) break;
     }
     if (!is_bare && best.report.after.max_error_m > before.max_error_m) {
-      // Measured with other samples, no pass improved the group.
+      // According to other samples, no pass improved the group.
       best.candidate = *plain;
       best.report = {.before = before,
                      .after = before,
@@ -192,8 +192,8 @@ class GroupRefiner {
   }
 
  private:
-  // Measures with samples that refinement has not used. Refinement reduces the error at its own
-  // samples most, and they may miss a peak.
+  // Measures the group with samples that refinement has not used. Refinement reduces the error most
+  // at its own samples, which may miss a peak.
   void Verify(const MotionGroup& group, GroupQuality& quality) const {
     const std::vector<ParameterValues> others =
         SampleHull(group, 2 * options_.samples, options_.seed + kOtherSeed);
@@ -220,7 +220,7 @@ class GroupRefiner {
     STRIDEWIRE_CHECK(group.site_count > group.example_count);
     const double radius = 2.0 * group.dilations.back();
     for (std::size_t i = 0; i < kNearSamples; ++i) {
-      // Moves towards another point of the hull, so that the sample is inside the hull.
+      // The sample is moved towards another point of the hull, so that it stays inside the hull.
       const ParameterValues& other =
           samples_[(i * 7919) % static_cast<std::size_t>(options_.samples)];
       double squared = 0.0;
@@ -269,7 +269,7 @@ class GroupRefiner {
     for (int added = 0;; ++added) {
       if (survey.max_m < options_.max_error_m &&
           (is_bare || IsWithinBounds(survey, current->basis.condition))) {
-        // The samples may miss a narrow peak, so other samples must agree.
+        // The samples may miss a narrow peak, so the limit must also hold at other samples.
         if (is_bare || checks >= kMaxChecks || !OtherSamplesFindMore(*current, ++checks, survey)) {
           report.end = RefineEnd::kErrorReached;
           break;
@@ -328,7 +328,7 @@ class GroupRefiner {
     return sites;
   }
 
-  // The bare rule: adds a pseudoexample at the largest error, even if the error increases.
+  // The bare rule: adds a pseudoexample at the largest error, even if the error then increases.
   std::shared_ptr<const Candidate> AddWorst(const Candidate& current, HullSurvey& survey,
                                             GroupRefinement& report) {
     for (const HullPoint& peak : survey.peaks) {
@@ -346,9 +346,9 @@ class GroupRefiner {
     return nullptr;
   }
 
-  // The amended rule: adds a pseudoexample at one of the largest errors, with the radius that gives
-  // the smallest largest error. Returns null if the error would not decrease, unless the pass
-  // accepts that.
+  // The amended rule: adds a pseudoexample at one of the largest errors. Chooses the position and
+  // the radius that minimize the largest error. Returns null if the error would not decrease,
+  // unless the pass accepts increases.
   std::shared_ptr<const Candidate> AddBest(const Pass& pass, const Candidate& current,
                                            HullSurvey& survey, GroupRefinement& report) {
     const std::vector<ParameterValues> hot = HotPoints(survey);
@@ -365,7 +365,7 @@ class GroupRefiner {
         const double below_m = best != nullptr    ? best_survey.max_m
                                : pass.accepts_any ? HUGE_VAL
                                                   : survey.max_m * (1.0 - kMinGain);
-        // Checks the hot samples first, where most candidates fail.
+        // Checks the hot samples first, because most candidates fail there.
         const bool is_worse = std::any_of(hot.begin(), hot.end(), [&](const ParameterValues& p) {
           const HullPoint point = probes_[0].At((*next)->group, p);
           return point.error_m >= below_m || point.weight_sum > sampled_weight_sum_;
@@ -404,7 +404,7 @@ class GroupRefiner {
   const RefineOptions& options_;
   std::span<GroupProbe> probes_;
   const std::function<bool(double)>& progress_;
-  std::vector<ParameterValues> samples_;  // Samples of the hull and peaks found so far.
+  std::vector<ParameterValues> samples_;  // Samples of the hull, and the peaks found so far.
   double max_weight_sum_ = kMaxRefinedWeightSum;
   double sampled_weight_sum_ = kMaxRefinedWeightSum;
   double max_condition_ = kMaxRefinedCondition;

@@ -13,19 +13,21 @@ namespace stridewire {
 
 /// Rules by which pseudoexamples are chosen.
 enum class RefineRule : std::uint8_t {
-  kAmended,  ///< Tries several passes and keeps only what reduces the largest error.
-  kBare,     ///< The rule of the paper: radii from all sites; every pseudoexample is added.
+  kAmended,  ///< Tries several passes. Keeps only pseudoexamples that reduce the largest error.
+  kBare,  ///< The rule of the paper: radii follow from all sites, and every pseudoexample is kept.
 };
 
 /// Defines the radius of a site.
 enum class RadiusRule : std::uint8_t {
-  kExamples,  ///< Distance to the nearest other example; for a pseudoexample, to the nearest site.
-  /// Distance to the nearest other site, so pseudoexamples reduce the radii of their neighbours.
+  /// For an example, distance to the nearest other example. For a pseudoexample, to the nearest
+  /// site.
+  kExamples,
+  /// Distance to the nearest other site. Pseudoexamples thus reduce the radii of their neighbours.
   kAllSites,
 };
 
-/// Limits of the amended rule. If a group exceeds a limit even without pseudoexamples, its own
-/// value is the limit.
+/// Limits of the amended rule. If a group exceeds a limit even without pseudoexamples, the limit is
+/// the value of the group instead.
 inline constexpr double kMaxRefinedWeightSum = 2.5;  ///< Largest sum of |w| over the hull.
 inline constexpr double kMaxRefinedCondition = 1e3;
 /// Minimum distance between a pseudoexample and any other site, in scaled parameters.
@@ -39,8 +41,8 @@ struct RefineOptions {
   int samples = 3000;  ///< Number of samples of the hull, 1 to kMaxSamples.
   std::uint32_t seed = 1;
   int threads = 0;  ///< Number of threads; 0: one per processor. It does not affect the result.
-  /// Called repeatedly, on the thread that called Refine, with the estimated share of the work that
-  /// is done, 0 to 1. Returns false to stop.
+  /// Called repeatedly, on the thread that called Refine, with the estimated fraction of the work
+  /// that is done, 0 to 1. Return false to stop.
   std::function<bool(double)> progress;
 
   static constexpr int kMaxPseudoexamples = 1024;
@@ -54,10 +56,10 @@ struct GroupQuality {
   double mean_error_m = 0.0;
   double max_error_m = 0.0;
   double weight_sum_max = 0.0;  ///< Largest sum of |w|.
-  double condition = 1.0;       ///< Condition of the radial part.
+  double condition = 1.0;       ///< Condition number of the matrix of the radial part.
 };
 
-/// Reason why the refinement of a group ended.
+/// Why the refinement of a group ended.
 enum class RefineEnd : std::uint8_t {
   kErrorReached,  ///< The largest error is below max_error_m.
   kCountReached,  ///< The group has max_pseudoexamples.
@@ -70,9 +72,9 @@ struct GroupRefinement {
   GroupQuality before;  ///< Quality without pseudoexamples, measured with samples of another seed.
   GroupQuality after;   ///< Quality with pseudoexamples, measured with the same samples.
   double pseudoexample_error_m = 0.0;        ///< Largest error at a pseudoexample.
-  RadiusRule radii = RadiusRule::kExamples;  ///< Radius rule of the best pass, see Refine.
+  RadiusRule radii = RadiusRule::kExamples;  ///< Radius rule of the best pass (see Refine).
   double radius_factor = 1.0;  ///< Factor by which the radii of the examples were multiplied.
-  int rejected = 0;            ///< Number of tried and rejected pseudoexamples.
+  int rejected = 0;            ///< Number of pseudoexamples that were tried and rejected.
   std::vector<double> max_error_curve_m;  ///< Largest error with 0, 1, ... pseudoexamples.
   RefineEnd end = RefineEnd::kErrorReached;
 };
@@ -82,27 +84,27 @@ struct Refinement {
   std::vector<GroupRefinement> groups;  ///< One entry per group, in the order of the library.
 };
 
-/// Adds pseudoexamples, which are sites with weights instead of motion, where the error of
-/// synthesized movements is largest (paper, Section 4):
+/// Adds pseudoexamples where the error of synthesized movements is largest (paper, Section 4). They
+/// are sites with weights instead of motion:
 ///
 ///   repeat: p^ = argmax e over the hull V of the examples: samples, then steepest ascent
 ///           p* with a(p*) = p^ (CorrectWeights); add the site p^ with the weights w(p*); refit
 ///   until max e < max_error_m or the number of pseudoexamples is reached
 ///
-/// With the bare rule the radii near a new site shrink, and sometimes the largest error grows. The
-/// amended rule keeps the condition below kMaxRefinedCondition and the sum of |w| below
-/// kMaxRefinedWeightSum. It runs these passes until one reaches max_error_m. If none does, the pass
-/// with the smallest largest error, measured with samples of another seed, is used:
+/// With the bare rule, the radii near a new site shrink, and sometimes the largest error grows. The
+/// amended rule keeps the condition number below kMaxRefinedCondition and the sum of |w| below
+/// kMaxRefinedWeightSum. It runs the following passes until one reaches max_error_m. If none does,
+/// the pass with the smallest largest error, measured with samples of another seed, is used.
 ///
-///   1. The radii of the examples are constant. Sites that do not reduce the error are rejected.
-///   2. Radii shrink, and every site is added. At the end the sites after the best state are
-///      dropped. The pass is repeated with several radii tried for each new site.
-///   3. Like 1, with the radii of the examples 2 and 3 times as wide, which suits evenly spaced
-///      examples.
+/// 1. The radii of the examples are constant. Sites that do not reduce the error are rejected.
+/// 2. Radii shrink, and every site is added. Finally, the sites added after the best state are
+///    dropped. A second run of this pass tries several radii for each new site.
+/// 3. Like 1, but with the radii of the examples 2 and 3 times as wide, which suits evenly spaced
+///    examples.
 ///
-/// Replaces existing pseudoexamples.
+/// Existing pseudoexamples are removed first.
 ///
-/// Errors: kOutOfRange for an option; kUnsupported, "stopped", if `progress` returned false.
+/// Errors: kOutOfRange for an option. kUnsupported, "stopped", if `progress` returned false.
 [[nodiscard]] Expected<Refinement> Refine(const std::shared_ptr<const MotionLibrary>& library,
                                           const RefineOptions& options = {});
 

@@ -16,10 +16,11 @@ namespace {
 
 constexpr std::size_t kOutlierExamplesMin = 8;
 constexpr std::size_t kExamplesPerOutlier = 10;
-// Points that are at most this far outside the hull count as inside.
+// Points outside the hull by at most this distance count as inside.
 constexpr double kInsideM = 1e-3;
-constexpr double kDeviationOfMad = 1.4826;  // Ratio of standard deviation and MAD.
-// Smaller spreads are treated as this spread, because they are not significant.
+// Ratio of the standard deviation to the median absolute deviation (MAD).
+constexpr double kDeviationOfMad = 1.4826;
+// Smaller deviations are replaced with this value, because their differences are not significant.
 constexpr double kMinPoseDeviationM = 2e-3;
 constexpr double kMinDurationDeviationS = 5e-3;
 
@@ -38,8 +39,8 @@ class Candidates {
 
   [[nodiscard]] int count() const { return static_cast<int>(examples_.size()); }
 
-  // Returns the error of each example when it is reproduced from `set`. It is 0 for members of the
-  // set, and infinite if the weights cannot be solved.
+  // Returns the error with which `set` reproduces each example. It is 0 for members of the set, and
+  // infinite if the weights cannot be solved.
   [[nodiscard]] std::vector<LeftOutError> Errors(const std::vector<int>& set) {
     std::vector<LeftOutError> errors(examples_.size());
     const std::optional<BlendSet> blend = Blend(set);
@@ -52,8 +53,7 @@ class Candidates {
     return errors;
   }
 
-  // Returns the error of each example in `of` when it is reproduced from all other examples in
-  // `of`.
+  // Returns the error with which each example in `of` is reproduced by the other examples in `of`.
   [[nodiscard]] std::vector<LeftOutError> LeaveOneOut(const std::vector<int>& of) {
     std::vector<LeftOutError> errors(of.size());
     ParallelFor(static_cast<int>(of.size()), 1, ThreadCount(0), [&](int k, int thread) {
@@ -116,7 +116,7 @@ Deviation DeviationOf(const std::vector<double>& values, double least) {
   return deviation;
 }
 
-// Removes the outliers from `left`, the worst first.
+// Removes the outliers from `left`, starting with the worst.
 void DropOutliers(const std::vector<GridExample>& examples, Candidates& candidates,
                   double deviations, std::vector<int>& left, GroupSelection& report) {
   const std::size_t most = examples.size() / kExamplesPerOutlier;
@@ -162,8 +162,8 @@ void DropOutliers(const std::vector<GridExample>& examples, Candidates& candidat
   }
 }
 
-// Chooses few candidates that reproduce all others within the bound, sorted by index. `errors`
-// receives the errors of all candidates.
+// Chooses few candidates that reproduce all others within the error bound, sorted by index. Writes
+// the errors of all candidates to `errors`.
 std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units, double bound_m,
                            std::vector<LeftOutError>& errors) {
   std::vector<int> chosen = {candidates.Middle(units)};
@@ -182,8 +182,7 @@ std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units
     chosen.insert(std::ranges::upper_bound(chosen, worst), worst);
     order.push_back(worst);
   }
-  // The first candidates were chosen before the others were known, so some of them have become
-  // redundant. Removes those.
+  // Early candidates were chosen before the others were known, so some of them are now redundant.
   for (bool changed = true; changed;) {
     changed = false;
     for (std::size_t k = 0; k < order.size() && chosen.size() > 1; ++k) {

@@ -9,20 +9,22 @@
 
 namespace stridewire {
 
-// The examples of a group to be stored, and why.
+// The examples of a group to store, and why they were selected.
 struct Selected {
-  std::vector<std::vector<int>> clusters;  // Examples to be stored as one; sorted by index.
-  std::vector<GridExample> examples;       // [cluster]
-  GroupSelection report;                   // Everything except `group`.
+  // Each cluster is stored as one example. Sorted by index.
+  std::vector<std::vector<int>> clusters;
+  std::vector<GridExample> examples;  // [cluster]
+  GroupSelection report;  // Report of the selection. All members except `group` are set.
 };
 
-// Selects the examples of a group to be stored:
+// Selects the examples of a group to store:
 //
-//   1. Outliers are dropped.
-//   2. Examples within `diameter` of each other are averaged.
-//   3. Starting with one average, the average that the chosen ones reproduce worst is added, until
-//      all are within the bound.
-//   4. In the order of adding, averages that the others reproduce within the bound are removed.
+// 1. Drops outliers.
+// 2. Averages examples within `diameter` of each other.
+// 3. Starts with one average. Adds the average that the chosen ones reproduce worst, until all are
+//    reproduced within the error bound.
+// 4. In the order in which they were added, removes averages that the others reproduce within the
+//    bound.
 //
 // The result does not depend on the number of threads.
 struct SelectExamplesJob {

@@ -97,8 +97,8 @@ struct Kriging {
     return functions;
   }
 
-  // Returns the weights [site] at p without site `left_out`. By block inversion, the inverse
-  // without its row and column is the full inverse minus a product of both.
+  // Returns the weights [site] at p without site `left_out`. By block inversion, the inverse of the
+  // matrix without that site's row and column is the full inverse minus a product of the two.
   [[nodiscard]] Eigen::VectorXd WeightsWithout(Eigen::Index left_out,
                                                std::span<const double> p) const {
     Eigen::VectorXd functions = Functions(p);
@@ -282,7 +282,7 @@ Expected<SmoothBasis> FitSmoothBasis(std::span<const double> sites,
     return SmoothBasis{*std::move(basis), 1.0};
   };
   if (d < kWideFromParameters) return fit_default_radii();
-  MotionGroup group;  // Contains only what SampleHull needs.
+  MotionGroup group;  // Only the members that SampleHull needs are set.
   group.parameters.resize(d);
   group.example_count = static_cast<int>(n);
   group.sites = sites;

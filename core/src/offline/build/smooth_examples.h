@@ -15,30 +15,30 @@
 namespace stridewire {
 
 // Captured movements with equal parameters differ by individual variation. The part that depends on
-// the parameters is a smooth function of them. It is a blend of the examples with weights of the
-// following kind (universal kriging: Matheron 1969; equivalently Wahba's smoothing with an
-// unpenalised linear part):
+// the parameters is a smooth function of them. It is a blend of the examples with the following
+// weights (universal kriging, Matheron 1969; equivalent to Wahba's smoothing with an unpenalised
+// linear part):
 //
 //   w(p) = R(p) r + A(p) a,   (R + ridge I) r + A a = I,   A^T r = 0,
 //   R_j(p) = B(|p - p_j| / radius)
 //
-// with A and B as in CardinalBasisFit. The weights sum to 1 and reproduce the parameters
-// (sum w_i p_i = p), but are not one-hot at the examples. A larger ridge removes more individual
-// variation.
+// with A and B as in CardinalBasisFit. The weights sum to 1 and reproduce the parameters (sum w_i
+// p_i = p). At an example, the weights of the other examples are not 0. A larger ridge removes more
+// individual variation.
 struct Smoothness {
   double ridge = 0.0;
   double radius = 0.0;  // Radius of the kernel, in units of Parameter::scale.
 };
 
-// Smoothing requires at least this number of examples per coefficient of the linear part. With
-// fewer examples, it could not separate individual variation from the influence of the parameters.
+// Minimum number of examples per coefficient of the linear part for smoothing. With fewer examples,
+// smoothing could not separate individual variation from the influence of the parameters.
 inline constexpr int kExamplesPerCoefficient = 4;
 
-// A group with the smooth weights of some of its examples. It has the motion of all examples; the
-// weights of the others are 0.
+// A group with the smooth weights of some of its examples. It stores the motion of all examples,
+// but the weights of the others are 0.
 struct SmoothGroup {
   std::vector<double> sites, dilations, linear, radial;
-  // The group. Its spans refer to the other members, and its sites are the examples used.
+  // Its spans refer to the other members, and its sites are the examples used.
   MotionGroup group;
 };
 
@@ -48,40 +48,42 @@ struct SmoothGroup {
                                                            const Smoothness& smoothness);
 
 // Sets group, parameters and weights of `movement` to the smooth movement with `parameters` [d].
-// Returns false if it misses the parameters by more than 0.1 mm. `scratch` receives the
-// weights.
+// Returns false if that movement misses the parameters by more than 0.1 mm. Writes the weights to
+// `scratch`.
 [[nodiscard]] bool SetSmoothWeights(const SmoothGroup& smooth, std::span<const double> parameters,
                                     CorrectionScratch& scratch, Movement& movement);
 
-// Returns the inner products of the movements of a group: <X_i, X_k> [n][n], in square metres,
-// where X_i are the joint positions of example i over its grid points. They are means over points
-// and joints, so that <X_i - X_k, X_i - X_k> is the mean squared distance.
+// Returns the inner products <X_i, X_k> [n][n] of the movements of a group, in square metres. X_i
+// are the joint positions of example i over its grid points. The products are means over points and
+// joints, so <X_i - X_k, X_i - X_k> is the mean squared distance.
 [[nodiscard]] std::vector<double> MovementProducts(const MotionGroup& group,
                                                    const GridLayout& layout,
                                                    const Skeleton& skeleton);
 
-// Chooses the smoothness with which the examples reproduce each other best. Each example is left
-// out, its parameters are projected onto the grown hull of the rest, as for requests, and the root
-// mean square distances of linearly blended joint positions are summed. `products`: see
-// MovementProducts. Returns nullopt if there are too few examples.
+// Chooses the smoothness with which the examples reproduce each other best. For this purpose, each
+// example is left out in turn, and its parameters are projected onto the enlarged hull of the
+// others, as for requests. The root mean square distances of linearly blended joint positions are
+// summed. `products`: see MovementProducts. Returns nullopt if there are too few examples.
 [[nodiscard]] std::optional<Smoothness> ChooseSmoothness(const MotionGroup& group,
                                                          std::span<const int> examples,
                                                          std::span<const double> products);
 
-// Replaces the poses and times of `examples` by those of the smooth movements with the same
-// parameters, which are blends of all examples of the group, and measures their parameters again.
-// `examples` must have the parameters and cells of the group. Returns nullopt and changes nothing
-// if there are too few examples. An example whose parameters cannot be reproduced within 0.1 mm
-// remains unchanged.
+// Replaces the poses and times of `examples` with those of the smooth movements with the same
+// parameters. These movements are blends of all examples of the group. Their parameters are
+// measured again. `examples` must have the parameters and cells of the group.
+//
+// Returns nullopt and changes nothing if there are too few examples. An example whose parameters
+// cannot be reproduced within 0.1 mm remains unchanged.
 std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLayout& layout,
                                          const Skeleton& skeleton,
                                          std::vector<GridExample>& examples);
 
-// Fits the weights of a library to smooth examples [count][d], with CardinalBasisFit. With three or
-// more parameters, it multiplies the radii by up to 1.5. The sum of |w| at samples must stay within
-// 2.4 (kMaxCorrectedWeightSum allows 2.5) and the condition below 1000. Wider radii are necessary
-// because a few sites in many dimensions are far apart, except for the nearest ones. With radii
-// equal to the distance of the nearest site, only the linear part would act in most of the hull.
+// Fits the weights of a library to smooth examples [count][d] with CardinalBasisFit. With three or
+// more parameters, the radii are multiplied by up to 1.5, as long as the sum of |w| at samples
+// stays within 2.4 (kMaxCorrectedWeightSum allows 2.5) and the condition number below 1000. Wider
+// radii are necessary because few sites in many dimensions are far apart, except for the nearest
+// ones. With radii equal to the distance of the nearest site, only the linear part would act in
+// most of the hull.
 struct SmoothBasis {
   CardinalBasis basis;
   double radius_factor = 1.0;  // Factor by which the dilations are multiplied.

@@ -10,12 +10,12 @@ namespace stridewire {
 namespace {
 
 constexpr double kJoltRadPerS2 = 400.0;
-// Standard deviation of the Gaussian weights of a mean: its growth per round and its largest value.
+// Standard deviation of the Gaussian mean: increment per round, and maximum.
 constexpr double kDeviationGrowthS = 0.005;
 constexpr double kMaxDeviationS = 0.06;
 // The deviation falls to 0 within this time before and after a jolt.
 constexpr double kJoltReachS = 0.15;
-// Means reach to this many standard deviations.
+// The mean includes rotations up to this many standard deviations away.
 constexpr double kMeanReach = 2.5;
 constexpr int kMaxWidenings = 24;
 
@@ -28,14 +28,14 @@ Vec3 SmallRotation(const Quat& a, const Quat& b) {
   return (turn.w < 0.0f ? -2.0f : 2.0f) * Vec3(turn.x, turn.y, turn.z);
 }
 
-// Returns for each joint whether it may be smoothed.
+// Returns one flag per joint: true if it may be smoothed.
 std::vector<bool> SmoothedJoints(const Skeleton& skeleton) {
   std::vector<bool> is_smoothed(skeleton.joints.size(), true);
   is_smoothed[0] = false;
   for (std::size_t j = 1; j < skeleton.joints.size(); ++j) {
     if (IsLimbEnd(skeleton, static_cast<int>(j))) is_smoothed[j] = false;
   }
-  // Excludes the joints of the legs and all joints between them and the root.
+  // Excludes the joints of the legs and the joints between them and the root.
   for (const Leg& leg : skeleton.legs) {
     for (int j = leg.ball; j > 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
       is_smoothed[static_cast<std::size_t>(j)] = false;
@@ -47,7 +47,7 @@ std::vector<bool> SmoothedJoints(const Skeleton& skeleton) {
 // Smooths the track of one joint.
 class JoltFilter {
  public:
-  // The argument `parent` contains the rotations of the parent in the world.
+  // `parent` contains the world rotations of the parent.
   JoltFilter(JointTrack& track, const JointTrack& parent, double spacing_s)
       : track_(track),
         parent_(parent),
@@ -99,7 +99,7 @@ class JoltFilter {
   }
 
   // Returns the mean over equally many rotations before and after a point. The first and the last
-  // point have no rotations on one side, so they keep their own.
+  // point have no neighbours on one side, so they remain unchanged.
   [[nodiscard]] Quat MeanAround(std::size_t point) const {
     const double deviation = deviation_s_[point] / spacing_s_;
     const auto reach = std::min({static_cast<std::size_t>(std::ceil(kMeanReach * deviation)), point,

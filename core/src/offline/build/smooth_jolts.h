@@ -8,17 +8,17 @@ namespace stridewire {
 
 // Smooths trunk, head and arms of an example where they jolt (decision 0048). A joint jolts if its
 // angular acceleration over two grid cells exceeds 400 rad/s^2, both relative to its parent and in
-// the world. Jolts are noise of the recording that averaging did not remove, because few examples
-// are similar. They are visible as pops, above all where steps are played faster.
+// the world. Jolts are noise of the recording that remains if few examples are similar enough to be
+// averaged. They are visible as pops, especially where steps are played faster.
 //
-// - A joint is replaced by its mean with Gaussian weights. The standard deviation grows from 0
-//   until the acceleration is within the limit, or up to 60 ms. It varies gradually, so that grid
-//   points further than 0.15 s from all jolts remain unchanged. The first and the last point remain
-//   unchanged as well.
-// - The children of a smoothed joint turn with it. If they compensated its noise, they jolt in the
-//   world afterwards, but by less than the limit.
-// - The root and the legs are not smoothed: their rotations determine where feet stand. Nor are
-//   fingers and thumbs (see RemoveJointNoise).
+// - Rotations of a jolting joint are replaced with their Gaussian mean. The standard deviation
+//   grows from 0 until the acceleration is within the limit, or up to 60 ms. It varies gradually,
+//   so grid points further than 0.15 s from all jolts remain unchanged. The first and the last
+//   point remain unchanged as well.
+// - The children of a smoothed joint rotate with it. If they compensated its noise before, they
+//   jolt in the world afterwards, but by less than the limit.
+// - The root and the legs are not smoothed, because they determine where feet stand. Fingers and
+//   thumbs are not smoothed either (see RemoveJointNoise).
 //
 // Returns true if a joint was smoothed.
 bool SmoothJolts(const Skeleton& skeleton, const GridLayout& layout, GridExample& example);

@@ -68,11 +68,12 @@ class MomentReader {
     return group.keytimes_s.subspan(static_cast<std::size_t>(example) * keys, keys);
   }
 
-  // The first or last grid point of an example, and the next one, from which velocities follow.
+  // The first or last grid point of an example, and its neighbour, from which velocities are
+  // computed.
   struct GridEnd {
     int point = 0;
     int neighbour = 0;
-    // Time from this point to the neighbour; negative if the neighbour is earlier.
+    // Time from this point to the neighbour. Negative if the neighbour is earlier.
     double to_neighbour_s = 0.0;
     double heading_rad = 0.0;
     double ground_m = 0.0;

@@ -7,14 +7,14 @@
 
 namespace stridewire {
 
-/// Largest number of examples per group that are compared; larger groups are sampled evenly.
+/// Maximum number of examples per group that are compared. Larger groups are sampled evenly.
 inline constexpr int kMaxComparedExamples = 64;
 
-/// Finds the best transition from every group to every group, where the standing pose counts as an
-/// additional group after the others: [from * (groups + 1) + to]. The best transition connects the
-/// example whose final pose is nearest to the initial pose of another (at most kMaxComparedExamples
-/// per group). The standing pose has velocity 0. The same content gives the same values.
-/// See docs/decisions/0015-transitions-are-computed-when-a-library-is-built.md.
+/// Finds the best transition from every group to every group: [from * (groups + 1) + to]. The stand
+/// pose is an additional group after the others. The best transition leads from the example whose
+/// final pose is closest to the initial pose of an example of the other group. At most
+/// kMaxComparedExamples per group are compared. The stand pose has velocity 0. Equal content gives
+/// equal results. See docs/decisions/0015-transitions-are-computed-when-a-library-is-built.md.
 [[nodiscard]] std::vector<Transition> FindTransitions(const LibraryContent& content);
 
 }  // namespace stridewire

@@ -5,9 +5,9 @@
 
 namespace stridewire::builtin {
 
-/// A C1 curve of cubic Hermite segments through knots, constant beyond its ends. If a knot has no
-/// slope, it gets the one that keeps the curve monotone between knots (PCHIP, Fritsch and Carlson
-/// 1980).
+/// A C1 curve of cubic Hermite segments through knots. It is constant beyond its ends. A knot
+/// without a slope gets the slope that keeps the curve monotone between knots (PCHIP, Fritsch and
+/// Carlson 1980).
 class Curve {
  public:
   struct Knot {
@@ -18,8 +18,8 @@ class Curve {
 
   Curve() : Curve({{0.0, 0.0}}) {}
 
-  /// `knots` must be non-empty and sorted by time. Ignores knots less than 1e-9 s after their
-  /// predecessor.
+  /// `knots` must be non-empty and sorted by time. Knots less than 1e-9 s after their predecessor
+  /// are ignored.
   explicit Curve(const std::vector<Knot>& knots);
 
   [[nodiscard]] double At(double time_s) const;

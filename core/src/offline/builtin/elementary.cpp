@@ -3,7 +3,7 @@
 namespace stridewire::builtin {
 
 double Exp(double x) {
-  // e^x = (e^(x/64))^64; the series converges fast for |x| <= 20/64.
+  // e^x = (e^(x/64))^64. The series converges fast because |x/64| <= 20/64.
   const double y = x / 64.0;
   double sum = 1.0;
   for (int n = 14; n >= 1; --n) sum = 1.0 + sum * y / n;

@@ -9,7 +9,7 @@
 
 namespace stridewire::builtin {
 
-/// The generated figure: stature H = 1.75 m, with segments as fractions of H (Drillis and Contini
+/// The generated figure is H = 1.75 m tall. Segment lengths are fractions of H (Drillis and Contini
 /// 1966, in Winter, Biomechanics and Motor Control of Human Movement). Lengths are in metres.
 inline constexpr double kStatureM = 1.75;
 inline constexpr double kThighM = 0.245 * kStatureM;
@@ -26,7 +26,7 @@ inline constexpr double kDegree = 0.017453292519943295;
 inline constexpr double kToeOutRad = 6.0 * kDegree;
 
 /// Joints of the figure, with the names of the CMU captures. The ball of the foot is the toe joint.
-/// It is in the plane of the sole, so that a flat foot turns about its contact point.
+/// It is in the plane of the sole, so that a flat foot rotates about its contact point.
 enum JointIndex : int {
   kHips,
   kLeftUpLeg,
@@ -54,10 +54,11 @@ enum JointIndex : int {
   kFigureJointCount
 };
 
-/// Returns the skeleton: a T-pose facing +Z at identity rotations.
+/// Returns the skeleton. With identity rotations it is in a T-pose and faces +Z.
 [[nodiscard]] Skeleton MakeFigure();
 
-/// A pose in double precision. Rotations are local; the root is in the frame of the example.
+/// A pose in double precision. Rotations are relative to the parent. The root is in the frame of
+/// the example.
 struct FigurePose {
   DVec3 root_m = DVec3(0.0);
   std::array<DQuat, kFigureJointCount> rotations;
@@ -65,7 +66,7 @@ struct FigurePose {
   FigurePose() { rotations.fill(DQuat(1.0, 0.0, 0.0, 0.0)); }
 };
 
-/// Rotations about the axes, in radians. RotateX with a positive angle lowers the toes.
+/// Return rotations about one axis. A positive angle of RotateX lowers the toes.
 [[nodiscard]] DQuat RotateX(double angle_rad);
 [[nodiscard]] DQuat RotateY(double angle_rad);
 [[nodiscard]] DQuat RotateZ(double angle_rad);
@@ -78,7 +79,7 @@ struct FigurePoints {
 
 [[nodiscard]] FigurePoints PointsOf(const Skeleton& figure, const FigurePose& pose);
 
-/// Returns the centre of mass, with masses and centres of the segments from Winter's table.
+/// Returns the centre of mass, computed with Winter's table of segment masses and centres.
 [[nodiscard]] DVec3 BodyCentre(const Skeleton& figure, const FigurePose& pose);
 
 /// Converts a pose to single precision.

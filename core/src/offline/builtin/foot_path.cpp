@@ -10,18 +10,18 @@
 namespace stridewire::builtin {
 namespace {
 
-// Least height of a swinging foot above level ground: 15 mm, plus the part that blending loses.
+// Minimum height of a swinging foot above level ground: 15 mm, plus what blending loses.
 constexpr double kClearanceM = 0.017;
 constexpr double kLiftStepM = 0.004;
 constexpr double kMinLiftM = -0.08;
 constexpr double kMaxLiftM = 0.30;
 
-// If the foot steps down by more than this, its toes land first, with this pitch.
+// If the foot steps down by more than this, its toes land first, at this pitch.
 constexpr double kToesFirstDropM = 0.1;
 constexpr double kToesFirstRad = -18.0 * kDegree;
-// Assumed edges of stair treads. If a foot steps up, the edge of the upper tread is this far behind
-// the ball of the foot after landing. If it steps down, the edge of the upper tread is this far
-// ahead of the ball before toe-off.
+// Assumed edges of stair treads. When a foot steps up, the edge of the upper tread is this far
+// behind the ball of the foot after landing. When it steps down, the edge is this far ahead of the
+// ball before toe-off.
 constexpr double kEdgeBehindBallM = 0.15;
 constexpr double kEdgeAheadOfBallM = 0.03;
 constexpr double kEdgeClearanceM = 0.02;
@@ -33,7 +33,7 @@ DVec3 Forward(Foot foot, double yaw_rad = 0.0) {
   return {Sin(yaw), 0.0, Cos(yaw)};
 }
 
-// In a step from standing, the foot pushes off half as much, because the body does not move yet.
+// In a step from standing, the foot pushes off half as much, because the body is not moving yet.
 double ToeOffPitch(const StepTiming& timing) {
   if (!timing.start.standing()) return timing.start.toe_off_pitch_rad;
   return 0.5 * 68.0 * kDegree * Tanh(0.5 * timing.end.length_m / 0.5);
@@ -42,14 +42,14 @@ double ToeOffPitch(const StepTiming& timing) {
 Curve MakeFixedPitch(const StepTiming& timing) {
   const GaitState& start = timing.start;
   const GaitState& end = timing.end;
-  // The heel rises slowly from the second half of single support and fast from the heel-strike of
-  // the other foot on.
+  // The heel rises slowly from the second half of single support on, and fast from the heel-strike
+  // of the other foot on.
   const RollOff& roll_off = end.roll_off;
   const double heel_off_s = timing.toe_off_s + roll_off.heel_rise_swing * timing.swing_s();
   const double at_strike = roll_off.strike * end.toe_off_pitch_rad;
   double strike_rate = 0.0;
   if (!end.standing()) {
-    // A steeper cubic would lower the toes into the ground first.
+    // A steeper cubic curve would first lower the toes into the ground.
     const double steepest = 3.0 * at_strike / (timing.heel_strike_s - heel_off_s);
     strike_rate =
         std::min(roll_off.strike_rate * end.toe_off_pitch_rad / end.half_support_s, steepest);
@@ -94,8 +94,8 @@ Curve MakeToeRock(const StepTiming& timing) {
   return Curve({{0.0, 0.0, 0.0}, {timing.toe_off_s, rock, 1.9 * rock / timing.toe_off_s}});
 }
 
-// Returns the angle of the toe joint in swing. At first the toes keep their pitch while the foot
-// continues to turn, so that their tip stays above the ground. Then they straighten.
+// Returns the angle of the toe joint in swing. The toes first keep their pitch while the foot
+// rotates further, so that the toe tip stays above the ground. Then they straighten.
 Curve MakeToeBend(const StepTiming& timing) {
   const double bend = ToeOffPitch(timing) - timing.start.toe_rock_rad();
   const double kept_s = timing.toe_off_s + 0.15 * timing.swing_s();
@@ -119,9 +119,8 @@ struct SwingEnd {
   double velocity;  // Metres per swing.
 };
 
-// Returns the position of a swinging foot along one axis, at the fraction `u` of its swing. The
-// foot is fastest at 70 % of the swing and slows down just before it lands, as in captures of
-// walking.
+// Returns the position of a swinging foot along one axis, at the fraction `u` of its swing. As in
+// captured walks, the foot is fastest at 70 % of the swing and slows down just before it lands.
 double SwingAlong(double u, const SwingEnd& from, const SwingEnd& to) {
   const double path_m = to.position_m - from.position_m;
   return Curve({{0.0, from.position_m, from.velocity},
@@ -170,7 +169,7 @@ FootPaths::FootPaths(Foot moving, const StepTiming& timing)
       toe_bend_(MakeToeBend(timing)) {
   fixed_ball_m_ = DVec3(StandingBall(OtherFoot(moving)).x, 0.0, 0.0);
   // The lengths of the shape are distances between the balls at both ends of the step. There, the
-  // ball of the front foot is raised, and thus further back than if the foot were flat.
+  // ball of the front foot is raised, and is thus further back than in a flat foot.
   const StepShape& shape = timing.shape;
   start_ball_m_ = fixed_ball_m_ + shape.start_m - DVec3(0.0, 0.0, timing.start.front_ball_back_m());
   end_ball_m_ = fixed_ball_m_ + RotateY(shape.turn_rad) *
@@ -202,7 +201,8 @@ FootPose FootPaths::MovingInSwing(double time_s) const {
   const double swing = timing_.swing_s();
   const double u = (time_s - timing_.toe_off_s) / swing;
   const double y0 = start_ball_m_.y, y1 = end_ball_m_.y, climb = y1 - y0;
-  // Downwards, the foot first moves forward past the edge of the tread. Upwards, it rises first.
+  // When stepping down, the foot first moves forward past the edge of the tread. When stepping up,
+  // it rises first.
   const double w = climb < 0.0   ? u + 0.6 * u * u * (1.0 - u)
                    : climb > 0.0 ? u - 0.6 * u * (1.0 - u) * (1.0 - u)
                                  : u;
@@ -221,7 +221,7 @@ FootPose FootPaths::MovingInSwing(double time_s) const {
         SwingAlong(u, {from.x, toe_off_velocity_.x * swing}, {to.x, strike_velocity_.x * swing});
     foot_pose.ankle_m.z =
         SwingAlong(u, {from.z, toe_off_velocity_.z * swing}, {to.z, strike_velocity_.z * swing});
-    // The ankle is highest early in the swing and then falls to slightly above its height at
+    // The ankle is highest early in the swing. It then descends to slightly above its height at
     // heel-strike.
     foot_pose.ankle_m.y = Curve({{0.0, from.y, toe_off_velocity_.y * swing},
                                  {0.72, to.y + 0.018, -0.06},
@@ -240,8 +240,8 @@ FootPose FootPaths::Moving(double time_s) const {
   return FootOnGround(moving_, end_ball_m_, moving_pitch_.At(time_s), 0.0, timing_.shape.turn_rad);
 }
 
-// Returns the height of the ground at z. It has one level at the start of the moving foot, one
-// below the fixed foot, and one where the moving foot lands.
+// Returns the height of the ground at z. The ground has three levels: where the moving foot starts,
+// below the fixed foot, and where the moving foot lands.
 double FootPaths::GroundAt(double z_m) const {
   const auto edge = [](const DVec3& behind, const DVec3& ahead) {
     return behind.y < ahead.y ? ahead.z - kEdgeBehindBallM : behind.z + kEdgeAheadOfBallM;
@@ -251,8 +251,8 @@ double FootPaths::GroundAt(double z_m) const {
   return 0.0;
 }
 
-// Returns the smallest distance between the feet during the swing, seen from above. Each foot
-// counts as the line from its heel to its toe tip.
+// Returns the smallest horizontal distance between the feet during the swing. Each foot is a line
+// from its heel to its toe tip.
 double FootPaths::NearestApproach() const {
   const Foot fixed = OtherFoot(moving_);
   const auto points = [](Foot foot, const FootPose& foot_pose, DVec3(&out)[5]) {

@@ -6,8 +6,9 @@
 
 namespace stridewire::builtin {
 
-/// The pose of a foot: position of the ankle, and pitch of foot and toes (radians, toes up is
-/// positive, in the frame of the example). At `yaw_rad` 0 the foot points outwards by kToeOutRad.
+/// The pose of a foot: position of the ankle, and pitch of foot and toes. Pitches are in radians in
+/// the frame of the example; positive raises the toes. At `yaw_rad` 0 the foot points outwards by
+/// kToeOutRad.
 struct FootPose {
   DVec3 ankle_m = DVec3(0.0);
   double pitch_rad = 0.0;
@@ -19,8 +20,8 @@ struct FootPose {
 [[nodiscard]] DQuat FootRotation(Foot foot, double pitch_rad, double yaw_rad = 0.0);
 
 /// Returns the pose of a foot on the ground whose ball would be at `flat_ball_m` if it were flat.
-/// The foot is turned about the heel for pitch > 0 and about the ball for pitch < 0. `toe_rock_rad`
-/// > 0 lifts the ball about the tip of the toes. The contact point stays exactly fixed.
+/// The foot is rotated about the heel for pitch > 0 and about the ball for pitch < 0. If
+/// `toe_rock_rad` > 0, the ball is lifted about the toe tip. The contact point stays exactly fixed.
 [[nodiscard]] FootPose FootOnGround(Foot foot, const DVec3& flat_ball_m, double pitch_rad,
                                     double toe_rock_rad, double yaw_rad = 0.0);
 
@@ -39,8 +40,7 @@ class FootPaths {
   [[nodiscard]] FootPose Fixed(double time_s) const;
   [[nodiscard]] FootPose Moving(double time_s) const;
 
-  /// Positions of the balls with flat feet: of the fixed foot, and of the moving foot before its
-  /// swing.
+  /// Balls of the fixed foot, and of the moving foot before its swing, when these feet are flat.
   [[nodiscard]] const DVec3& fixed_ball_m() const { return fixed_ball_m_; }
   [[nodiscard]] const DVec3& start_ball_m() const { return start_ball_m_; }
 
@@ -58,7 +58,7 @@ class FootPaths {
   Curve fixed_pitch_, moving_pitch_, toe_rock_, toe_bend_;
   DVec3 toe_off_m_, strike_m_, toe_off_velocity_, strike_velocity_;
   double lift_m_ = 0.0;
-  double detour_m_ = 0.0;  // Sideways detour of the swing around the fixed foot.
+  double detour_m_ = 0.0;  // Sideways detour of the swinging foot around the fixed foot.
 };
 
 }  // namespace stridewire::builtin

@@ -12,13 +12,13 @@
 namespace stridewire::builtin {
 namespace {
 
-// On stairs the heel rises further, so that the ankle below a bent knee can stay lower.
+// On stairs, the heel rises further, so that the ankle of a leg with a bent knee can stay lower.
 constexpr double kRiseHeel_deg_m = 60.0;
 constexpr double kMinStairsStepS = 0.72;
-// Additional time per height difference, in seconds per metre.
+// Additional duration of a step in seconds per metre of height difference.
 constexpr double kRiseTime_s_m = 0.6;
 
-// In straight walking the heel rises late and fast. On stairs it rises early, since the rear leg
+// In straight walking, the heel rises late and fast. On stairs it rises early, because the rear leg
 // pushes the body up.
 constexpr RollOff kStraightRollOff = {.heel_rise_swing = 0.52,
                                       .strike = 0.15,
@@ -51,7 +51,7 @@ RollOff RollOffOf(double length_m, StepStyle style) {
     case StepStyle::kStairs: return kStairsRollOff;
     case StepStyle::kStraight: break;
   }
-  // In long steps the heel rises earlier, because the flat foot does not reach as far back.
+  // In long steps, the heel rises earlier, because a flat foot cannot stay as far behind the body.
   RollOff roll_off = kStraightRollOff;
   const double long_step = std::clamp((length_m - 0.55) / 0.2, 0.0, 1.0);
   roll_off.strike += 0.15 * long_step;
@@ -102,21 +102,21 @@ GaitState MakeGaitState(double length_m, double rise_m, StepStyle style) {
   if (state.standing()) return state;
   state.step_s = StepTime(length_m, rise_m, style);
   const double mean_speed = length_m / state.step_s;
-  // The pelvis is lowest and fastest while both feet are on the ground: it exchanges height for
-  // speed like a pendulum (Cavagna and Margaria 1966).
+  // The pelvis is lowest and fastest while both feet are on the ground. As in a pendulum, height is
+  // exchanged for speed (Cavagna and Margaria 1966).
   state.speed_mps = (on_stairs ? 0.95 : 1.08) * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
-  // Double support takes 20 to 24 % of the stride at free speed (Perry and Burnfield, Gait
-  // Analysis) and more in slow walking: here 21 % at 1.4 m/s and 35 % at 0.57 m/s.
+  // At free speed, double support takes 20 to 24 % of the stride (Perry and Burnfield, Gait
+  // Analysis), and more in slow walking. Here it is 21 % at 1.4 m/s and 35 % at 0.57 m/s.
   const double share = on_stairs ? 0.12 : 0.220 - 0.105 * state.vigour;
   state.half_support_s = ToWholeFrames(share * state.step_s);
   STRIDEWIRE_CHECK(state.half_support_s > 0.0);
   state.strike_pitch_rad = on_stairs ? 0.0 : 24.0 * kDegree * Tanh(length_m / 0.5);
   const Curve toe_off_deg({{0.0, 0.0}, {0.35, 37.0}, {0.55, 58.0}, {0.75, 62.0}, {0.9, 65.0}});
   state.toe_off_pitch_rad = (toe_off_deg.At(length_m) + kRiseHeel_deg_m * rise_m) * kDegree;
-  // The pelvis falls by half of what it would fall on stiff legs: by 27 mm at 0.7 m/s and 48 mm at
-  // 1.6 m/s (Orendurff et al. 2004, centre of the body). The front knee yields by 15 to 20 degrees.
-  // The pelvis is as far back as the front leg can reach at heel-strike.
+  // The pelvis descends by half of what it would descend on stiff legs: 27 mm at 0.7 m/s and 48 mm
+  // at 1.6 m/s (Orendurff et al. 2004, centre of the body). The front knee bends by 15 to 20
+  // degrees. The pelvis is as far back as the front leg can reach at heel-strike.
   const Curve drop =
       on_stairs ? Curve({{0.0, 0.0}, {0.35, 0.003}, {0.55, 0.021}, {0.75, 0.0415}, {0.9, 0.075}})
                 : Curve({{0.0, 0.0}, {0.35, 0.0145}, {0.55, 0.0280}, {0.75, 0.052}, {0.9, 0.088}});
@@ -125,7 +125,7 @@ GaitState MakeGaitState(double length_m, double rise_m, StepStyle style) {
       on_stairs ? Curve({{0.0, 0.02}, {0.35, 0.240}, {0.55, 0.405}, {0.75, 0.4955}, {0.9, 0.59}})
                 : Curve({{0.0, 0.02}, {0.35, 0.255}, {0.55, 0.355}, {0.75, 0.474}, {0.9, 0.54}});
   state.pelvis_ahead_m = ahead.At(length_m);
-  // The pelvis moves by 7.0 cm peak to peak at 0.7 m/s and by 3.9 cm at 1.6 m/s (Orendurff et al.
+  // The pelvis sways by 7.0 cm peak to peak at 0.7 m/s and by 3.9 cm at 1.6 m/s (Orendurff et al.
   // 2004).
   state.sway_m = 0.5 * (0.070 - (mean_speed - 0.7) / 0.9 * 0.031);
   return state;

@@ -4,58 +4,60 @@
 
 namespace stridewire::builtin {
 
-/// Frame rate of generated clips. Keytimes are whole frames, so that every state is a frame.
+/// Frame rate of generated clips. Keytimes are whole frames, so every state is a frame.
 inline constexpr double kClipFps = 120.0;
 
 /// Rounds a time to whole frames.
 [[nodiscard]] double ToWholeFrames(double time_s);
 
-/// Returns the duration of a step in steady walking, in seconds. It falls with the length, since
-/// people lengthen their steps and take more of them as they walk faster (Grieve and Gear 1966).
-/// The cadence is 107 steps per minute at 0.6 m, and 118 at 0.78 m. Murray, Drought and Kory 1964
-/// measured 117 at 0.78 m in men who walked at their free speed.
+/// Returns the duration of a step in steady walking, in seconds. It decreases with length, because
+/// people who walk faster take longer steps and more of them (Grieve and Gear 1966). The cadence is
+/// 107 steps per minute at 0.6 m and 118 at 0.78 m. Murray, Drought and Kory 1964 measured 117 at
+/// 0.78 m in men who walked at their free speed.
 [[nodiscard]] double SteadyStepTime(double length_m);
 
-/// Returns the duration of a step with feet that differ in height by `rise_m`. People take slower
-/// steps on stairs and uneven ground.
+/// Returns the duration of a step whose feet differ in height by `rise_m`. People step more slowly
+/// on stairs and uneven ground.
 [[nodiscard]] double StepTime(double length_m, double rise_m, StepStyle style);
 
-/// Pitches of a foot while it rolls over its ball, as shares of its pitch at toe-off.
+/// Pitch of a foot while it rolls over its ball, as fractions of its pitch at toe-off. Rates are
+/// changes per half of double support. "The state" is the middle of double support (GaitState).
 struct RollOff {
   double heel_rise_swing;  ///< Fraction of the swing of the other foot at which the heel rises.
   double strike;           ///< Pitch when the other foot lands.
-  double strike_rate;      ///< Change per half of double support, when the other foot lands.
-  double state;            ///< Pitch in the middle of double support.
-  double state_rate;       ///< Change per half of double support, in its middle.
-  double toe_off_rate;     ///< Change per half of double support, at toe-off.
+  double strike_rate;      ///< Rate when the other foot lands.
+  double state;            ///< Pitch in the state.
+  double state_rate;       ///< Rate in the state.
+  double toe_off_rate;     ///< Rate at toe-off.
   double toe_rock;         ///< Angle of the toes about their tip at toe-off.
   double swing;            ///< Pitch in the middle of the swing.
 };
 
-/// The middle of double support in steady walking with the feet `length_m` apart. It determines
-/// pose and velocity at the start and the end of a step. Length 0 is standing.
+/// State in the middle of double support, in steady walking with the feet `length_m` apart. It
+/// determines pose and velocity at the start and the end of a step. Length 0 is standing.
 ///
 /// Each foot rolls over three rockers (Perry and Burnfield, Gait Analysis): over the heel from
 /// heel-strike until the sole is flat, then the shank over the ankle, then the foot over the ball
 /// from the middle of single support until toe-off. Pitches of the feet around the state:
 ///
 ///        heel-strike   state      toe-off
-///   front      a        0.32 a       0       foot pitch, toes up is positive
+///   front      a        0.32 a       0       foot pitch; positive raises the toes
 ///   rear   -0.15 b     -0.40 b      -b      `RollOff`, in straight walking
 struct GaitState {
   double length_m = 0.0;
   /// Time from heel-strike to the state, and from the state to toe-off.
   double half_support_s = 0.0;
-  double step_s = 0.0;             ///< Duration of a steady step between two such states.
-  double speed_mps = 0.0;          ///< Forward speed of the pelvis.
-  double vigour = 0.0;             ///< min(1, speed / 1.4 m/s); scales motion of the upper body.
-  double strike_pitch_rad = 0.0;   ///< a.
+  double step_s = 0.0;            ///< Duration of a steady step between two such states.
+  double speed_mps = 0.0;         ///< Forward speed of the pelvis.
+  double vigour = 0.0;            ///< min(1, speed / 1.4 m/s). Scales the motion of the upper body.
+  double strike_pitch_rad = 0.0;  ///< a.
   double toe_off_pitch_rad = 0.0;  ///< b, positive.
   RollOff roll_off{};
-  double pelvis_drop_m = 0.0;  ///< Height of the pelvis below standing.
-  /// Distance of the pelvis in front of the rear ankle, if that foot is flat.
+  double pelvis_drop_m = 0.0;  ///< Height by which the pelvis is lower than in standing.
+  /// Distance of the pelvis in front of the ankle of the rear foot, assuming that this foot is
+  /// flat.
   double pelvis_ahead_m = 0.0;
-  double sway_m = 0.0;  ///< Sideways amplitude of a step between two such states.
+  double sway_m = 0.0;  ///< Amplitude of the sideways sway in a step between two such states.
   /// Height of the front foot above the rear foot.
   double ascent_m = 0.0;
 
@@ -67,11 +69,11 @@ struct GaitState {
   [[nodiscard]] double rear_pitch_rate() const;
   /// Angle of the toes about their tip at toe-off.
   [[nodiscard]] double toe_rock_rad() const { return roll_off.toe_rock * toe_off_pitch_rad; }
-  /// Returns the distance by which raising the ball of the front foot moves it back.
+  /// Returns the distance by which the ball of the front foot moves back because it is raised.
   [[nodiscard]] double front_ball_back_m() const;
 };
 
-/// `rise_m`: height difference of the feet.
+/// `rise_m` is the height difference of the feet.
 [[nodiscard]] GaitState MakeGaitState(double length_m, double rise_m = 0.0,
                                       StepStyle style = StepStyle::kStraight);
 

@@ -14,7 +14,7 @@ namespace {
 
 using Names = std::vector<ParameterName>;
 
-// Returns a length below 1 m in metres with two decimals.
+// Formats a length below 1 m in metres with two decimals.
 std::string MetresText(double length_m) {
   const int centimetres = static_cast<int>(std::floor(std::fabs(length_m) * 100.0 + 0.5));
   const std::string digits = std::to_string(centimetres);
@@ -72,9 +72,9 @@ class MirroredGroups {
   RawGroup left_, right_;
 };
 
-// Adds steps upwards (`direction` 1) or downwards (-1). These are separate groups, because knees
-// bend more the farther a step is from level, upwards as well as downwards. The linear part of one
-// interpolation cannot represent such a minimum at level steps.
+// Adds steps upwards (`direction` 1) or downwards (-1). They form separate groups, because knees
+// bend least in level steps and more in steps up or down. The linear part of one interpolation
+// cannot represent this minimum.
 void AddClimbingSteps(double direction, RawLibrary& library) {
   constexpr double kRiseM = 0.25;
   constexpr double kTurnRad = 35.0 * kDegree;
@@ -94,7 +94,7 @@ void AddClimbingSteps(double direction, RawLibrary& library) {
     shape.style = StepStyle::kStairs;
     groups.Add(library.skeleton, shape);
   };
-  // On stairs the other foot is one tread away; on level ground the length varies more.
+  // On stairs, the other foot is one tread away. On level ground, the length varies more.
   const auto lengths = [](double height) {
     return height == 0.0 ? std::array{0.0, 0.5} : std::array{0.28, 0.42};
   };
@@ -103,7 +103,7 @@ void AddClimbingSteps(double direction, RawLibrary& library) {
       for (const double end_z : lengths(climb.end)) add(climb, start_z, end_z, 0.0);
     }
     for (const double turn_rad : {kTurnRad, -kTurnRad}) add(climb, 0.3, 0.3, turn_rad);
-    // The bend of knees is proportional to the square root of the height, so the blend needs an
+    // The bend of the knees is proportional to the square root of the height, so the blend needs an
     // example halfway between level and high.
     const Climb half{0.5 * climb.start, 0.5 * climb.end};
     if ((climb.start == 0.0) == (climb.end == 0.0)) {
@@ -157,8 +157,8 @@ void AddTurningSteps(RawLibrary& library) {
     shape.start_m.x = start_x;
     shape.turn_rad = turn_rad;
     shape.style = StepStyle::kGeneral;
-    // If the foot turns outwards and lands beside the other, it must not touch the heel of that
-    // foot.
+    // If the foot turns outwards and lands beside the other foot, it needs room for that foot's
+    // heel.
     if (end_z == 0.0 && turn_rad > 0.0) shape.end_m.x = WidthAfterTurnM(turn_rad);
     groups.Add(library.skeleton, shape);
   };
@@ -170,7 +170,7 @@ void AddTurningSteps(RawLibrary& library) {
       }
     }
   }
-  // Adds steps that continue after an outward turn.
+  // Steps that follow an outward turn.
   const double wide_m = WidthAfterTurnM(kSpotTurnRad);
   add(wide_m, 0.0, 0.0, 0.0);
   add(wide_m, 0.0, 0.0, kSpotTurnRad);

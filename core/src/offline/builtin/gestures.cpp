@@ -14,12 +14,13 @@ namespace {
 constexpr double kFps = 60.0;
 constexpr double kTwoPi = 6.283185307179586;
 
-// Shoulder, upper arm, forearm and hand have successive indices. Arms point sideways at identity.
+// Shoulder, upper arm, forearm and hand have successive indices. With identity rotations, arms
+// point sideways.
 std::size_t ShoulderOf(Foot side) { return side == Foot::kLeft ? kLeftShoulder : kRightShoulder; }
 
-// Angles of an arm in radians: raised forwards (flexion) and sideways (abduction), turned about its
-// own axis, and bent at elbow and wrist. At outward_turn 0 the elbow bends forwards, outward turns
-// make it bend upwards.
+// Angles of an arm in radians: raised forwards (flexion) and sideways (abduction), rotated about
+// its own axis, and bent at elbow and wrist. At outward_turn 0 the elbow bends forwards. A positive
+// outward_turn makes it bend upwards.
 struct ArmAngles {
   double flexion = 0.0;
   double abduction = 0.0;
@@ -40,8 +41,8 @@ void SetArm(Foot side, const ArmAngles& arm, FigurePose& pose) {
   pose.rotations[shoulder + 3] = RotateY(-out * arm.wrist);
 }
 
-// `phase` increases from 0 to 1 over the loop. The forearm swings twice, and the hand lags behind
-// it.
+// Returns the pose at `phase`, which increases from 0 to 1 over the loop. The forearm swings twice,
+// and the hand lags behind it.
 FigurePose Waving(double phase) {
   const double swing = Sin(2.0 * kTwoPi * phase);
   const double behind = Sin(2.0 * kTwoPi * phase - 0.9);
@@ -57,8 +58,8 @@ FigurePose Waving(double phase) {
   return pose;
 }
 
-// The forearms are level, the hands a box apart, and the back leans against the load. The figure
-// breathes.
+// Returns the pose at a phase of the loop. The forearms are level, the hands are apart by the width
+// of a box, and the back leans against the load. The figure breathes.
 FigurePose Carrying(double phase) {
   const double breath = Sin(kTwoPi * phase);
   FigurePose pose;
@@ -108,7 +109,8 @@ void AddGestures(RawLibrary& library) {
   RawLayer carry = MakeLoop("carry", 3.0, Carrying);
   IncludeArm(Foot::kLeft, carry);
   IncludeArm(Foot::kRight, carry);
-  // The spine blends from the motion of the legs below it to that of the load above it.
+  // The weights of the spine blend from the motion of the legs below it to that of the load above
+  // it.
   carry.weights[kLowerBack] = 0.25f;
   carry.weights[kSpine] = 0.5f;
   carry.weights[kSpine1] = 0.75f;

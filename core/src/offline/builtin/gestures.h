@@ -4,7 +4,7 @@
 
 namespace stridewire::builtin {
 
-/// Adds two looping layers: "wave" raises the right arm and swings its forearm, "carry" holds both
+/// Adds two looping layers. "wave" raises the right arm and swings its forearm. "carry" holds both
 /// forearms forward as if under a box.
 void AddGestures(RawLibrary& library);
 

@@ -28,7 +28,7 @@ class JumpPath {
  public:
   JumpPath(const Skeleton& figure, double length_m) : figure_(figure), length_m_(length_m) {
     // The height of the centre of mass at landing depends on the pose, whose curves depend on the
-    // times. After three iterations, the times no longer change by a frame.
+    // times. After three iterations, the times change by less than a frame.
     double lower_m = 0.15;
     for (int i = 0; i < 3; ++i) {
       PlanTimes(lower_m);
@@ -101,7 +101,7 @@ class JumpPath {
 
   void PlanFeet() {
     const double push_s = toe_off_s() - lowest_s();
-    // The ankles extend last: at toe-off they rise almost as fast as the body.
+    // The ankles extend last. At toe-off they rise almost as fast as the body.
     toe_off_pitch_rad_ = (36.0 + 11.0 * length_m_) * kDegree;
     const double rate = 0.75 * velocity_.y / kBallAheadOfAnkleM;
     push_pitch_ = Curve({{0.0, 0.0, 0.0},
@@ -111,12 +111,12 @@ class JumpPath {
     landing_pitch_ = Curve({{landing_s(), strike, -strike / 0.12}, {landing_s() + 0.09, 0.0, 0.0}});
   }
 
-  // Plans the path of the centre of mass: down and forwards over the balls, a parabola in flight,
-  // and down again after landing.
+  // Plans the path of the centre of mass: down and forwards over the balls, along a parabola in
+  // flight, and down again after landing.
   void PlanCentre() {
     const FigurePose standing = StandingPose();
     DVec3 rest = BodyCentre(figure_, standing);
-    // Measure the position from the balls of the feet.
+    // Positions are relative to the balls of the feet.
     rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;
 
     // At toe-off the centre is ahead of the balls and as high as the legs allow.
@@ -145,8 +145,8 @@ class JumpPath {
                              {end_s(), length_m_ + rest.z, 0.0}});
   }
 
-  // In flight, the length and angle of the leg from the hip are prescribed, so that it stays in
-  // reach.
+  // In flight, length and angle of the line from hip to ankle are prescribed, so that the leg can
+  // reach the foot.
   void PlanFlight() {
     const double h = 1e-4;
     const LegAim leave = AimAt(toe_off_s()), land = AimAt(landing_s());
@@ -168,18 +168,19 @@ class JumpPath {
   }
 
   struct LegAim {
-    // Length and angle of the line from hip to ankle, seen from the side; forward is positive.
+    // Length and angle of the line from hip to ankle, seen from the side. A positive angle is
+    // forward.
     double length_m, angle_rad;
   };
 
   [[nodiscard]] LegAim AimAt(double time_s) const {
     const FigurePose pose = PoseWithCentre(time_s, Centre(time_s));
     const DVec3 leg = PoseOfFoot(Foot::kLeft, time_s, pose).ankle_m -
-                      pose.root_m;  // The hips have the same z as the root.
+                      pose.root_m;  // The hips are at the same z as the root.
     return {std::sqrt(leg.y * leg.y + leg.z * leg.z), Atan2(leg.z, -leg.y)};
   }
 
-  // Landing position of the centre of mass, which is behind the feet.
+  // Returns z of the centre of mass at landing, which is behind the feet.
   [[nodiscard]] double landing_z() const { return 0.84 * length_m_ - 0.08; }
 
   // Returns the height of the centre of mass at which the knees are bent by `knee_rad`, if the
@@ -222,8 +223,8 @@ class JumpPath {
     return foot_pose;
   }
 
-  // Solves for the root iteratively, since the legs follow the root and move the centre of mass.
-  // Legs on the ground compensate a part of each shift, so each shift is 15 % larger than the
+  // Solves for the root iteratively, because the legs follow the root and move the centre of mass.
+  // Legs on the ground compensate for a part of each shift, so each shift is 15 % larger than the
   // error.
   [[nodiscard]] FigurePose PoseWithCentre(double time_s, const DVec3& centre_m) const {
     UpperBody body = StandingUpperBody();
@@ -240,7 +241,7 @@ class JumpPath {
       SolveLeg(Foot::kLeft, PoseOfFoot(Foot::kLeft, time_s, pose), pose);
       SolveLeg(Foot::kRight, PoseOfFoot(Foot::kRight, time_s, pose), pose);
       DVec3 miss = centre_m - BodyCentre(figure_, pose);
-      miss.x = -pose.root_m.x;  // The jump is symmetric.
+      miss.x = -pose.root_m.x;  // The jump is symmetric, so sideways errors are those of the root.
       pose.root_m += 1.15 * miss;
       if (glm::dot(miss, miss) < 1e-20) break;
     }

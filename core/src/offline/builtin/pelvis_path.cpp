@@ -13,19 +13,21 @@ namespace stridewire::builtin {
 namespace {
 
 constexpr int kSamples = 161;
-constexpr double kMinKneeRad = 6.0 * kDegree;  // The knees bend by at least this angle.
-// Amplitudes at 1.4 m/s. Perry and Burnfield, Gait Analysis, state 5 degrees of yaw and 4 of
-// obliquity to each side. These are slightly larger, because blended steps lose a part.
+constexpr double kMinKneeRad = 6.0 * kDegree;  // Minimum bend of the knees.
+// Amplitudes at 1.4 m/s. Perry and Burnfield, Gait Analysis, give 5 degrees of yaw and 4 of
+// obliquity to each side. The amplitudes are slightly larger, because blended steps lose a part of
+// them.
 constexpr double kYawRad = 6.5 * kDegree;
 constexpr double kRollRad = 4.8 * kDegree;
 constexpr double kTiltRad = 1.5 * kDegree;
 
-// Where the pelvis is between the feet, sideways: 0 above the fixed foot, 1 above the moving foot.
+// Sideways position of the pelvis between the feet: 0 is above the fixed foot, 1 above the moving
+// foot.
 constexpr double kMiddleShare = 0.5;
 
-// Positions of the pelvis at both ends of a step, except for its height. A step can only follow
-// another one without a jump if both have the same pelvis in the state in between. Therefore the
-// position depends only on the balls of the feet and on the state, as if the rear foot were flat.
+// Horizontal positions of the pelvis at both ends of a step. Steps follow each other without a jump
+// only if both have the same pelvis in the state between them. The position therefore depends only
+// on the balls of the feet and on the state. The rear foot is assumed to be flat.
 struct Ends {
   DVec3 start;
   DVec3 end;
@@ -61,7 +63,7 @@ Curve MakeSway(Foot moving, const StepTiming& timing) {
   const double toward_fixed = SideSign(OtherFoot(moving));
   double sway = 0.5 * (start.sway_m + end.sway_m);
   if (start.standing() || end.standing()) {
-    sway = 0.036;  // The weight must move over one foot without momentum.
+    sway = 0.036;  // Without momentum, the weight must move over one foot.
   }
   // Before a foot moves far sideways, the body leans to the other side.
   const double stand_width = 2.0 * StandingBall(Foot::kLeft).x;
@@ -75,19 +77,19 @@ Curve MakeSway(Foot moving, const StepTiming& timing) {
                 {timing.end_s, 0.0, -toward_fixed * rate(end)}});
 }
 
-// The side of the leading leg is forward. A positive yaw moves the right side forwards.
+// The hip of the leading leg is forward. A positive yaw moves the right side forward.
 Curve MakeYaw(Foot moving, const StepTiming& timing) {
   const double to_right = SideSign(moving);
   return Curve({{0.0, to_right * kYawRad * timing.start.vigour, 0.0},
                 {timing.end_s, -to_right * kYawRad * timing.end.vigour, 0.0}});
 }
 
-// The weight moves to the front leg until toe-off. Then the side of the swinging leg drops, most at
-// 15 % of the stride after the heel-strike of the other leg, and is level again at its own
+// The weight moves to the front leg until toe-off. Then the side of the swinging leg drops. It is
+// lowest 15 % of the stride after the heel-strike of the other leg, and level again at its own
 // heel-strike (Perry and Burnfield, Gait Analysis).
 Curve MakeRoll(Foot moving, const StepTiming& timing) {
   const double drop = -SideSign(moving) * kRollRad;
-  // Slow steps keep more of the obliquity than of the other rotations.
+  // In slow steps, obliquity decreases less than the other rotations.
   const auto share = [](const GaitState& state) {
     return state.standing() ? 0.0 : 0.35 + 0.65 * state.vigour;
   };
@@ -109,9 +111,9 @@ Curve MakeTilt(const StepTiming& timing) {
                 {timing.end_s, end, 0.0}});
 }
 
-// Returns the height of the pelvis in a state in which the moving foot is `moved_m` from the fixed
-// one. It is the height of walking above the lower foot, unless the legs with knees bent by 12
-// degrees do not reach that far.
+// Returns the height of the pelvis in a state in which the moving foot is at `moved_m` relative to
+// the fixed one. It is the walking height above the lower foot, unless legs with knees bent by 12
+// degrees cannot reach that far.
 double StateHeight(const GaitState& state, const DVec3& moved_m) {
   const double low = std::min(0.0, moved_m.y);
   const double height = low + kStandingHipHeightM - state.pelvis_drop_m;
@@ -121,7 +123,8 @@ double StateHeight(const GaitState& state, const DVec3& moved_m) {
   const bool fixed_is_rear = moved_m.z >= 0.0;
   const DVec3 rear_ball = fixed_is_rear ? DVec3(0.0) : moved_m;
   const DVec3 front_ball = fixed_is_rear ? moved_m : DVec3(0.0);
-  const double side = fixed_is_rear ? -1.0 : 1.0;  // Side of the rear foot; the left foot moves.
+  // Side of the rear foot. The left foot is the moving foot.
+  const double side = fixed_is_rear ? -1.0 : 1.0;
   const Foot rear = fixed_is_rear ? Foot::kRight : Foot::kLeft;
   const DVec3 rear_ankle = FootOnGround(rear, rear_ball, state.rear_pitch_rad(), 0.0).ankle_m;
   const DVec3 front_ankle =
@@ -138,7 +141,7 @@ double StateHeight(const GaitState& state, const DVec3& moved_m) {
 DVec3 AsLeft(Foot moving, const DVec3& d) { return {SideSign(moving) * d.x, d.y, d.z}; }
 
 Curve MakeHeight(Foot moving, const StepTiming& timing) {
-  // At the highest point the knee of the standing leg is bent by 5 to 10 degrees.
+  // At the highest point, the knee of the standing leg is bent by 5 to 10 degrees.
   const double vigour = 0.5 * (timing.start.vigour + timing.end.vigour);
   const double top = kStandingHipHeightM - 0.003 - 0.002 * vigour;
   const double start = StateHeight(timing.start, AsLeft(moving, timing.shape.start_m));
@@ -147,8 +150,8 @@ Curve MakeHeight(Foot moving, const StepTiming& timing) {
   if (level) {
     return Curve({{0.0, start, 0.0}, {0.42 * timing.end_s, top, 0.0}, {timing.end_s, end, 0.0}});
   }
-  // Upwards, most of the rise is early, when the upper leg takes the weight. Downwards, most of the
-  // drop is late.
+  // In steps up, most of the rise is early, when the upper leg takes the weight. In steps down,
+  // most of the drop is late.
   const double middle = top - 0.2 * std::max(0.0, top - start) - 0.25 * std::max(0.0, top - end);
   return Curve({{0.0, start, 0.0}, {0.45 * timing.end_s, middle}, {timing.end_s, end, 0.0}});
 }
@@ -209,8 +212,8 @@ double PelvisPath::MissingReach(const FootPaths& feet, double time_s) const {
 }
 
 void PelvisPath::StayWithinReach(const FootPaths& feet) {
-  // A fit of a few spline knots would diverge, because the limit has a kink where the other leg
-  // becomes the limiting one. Therefore the lowering is filtered.
+  // A fit with a few spline knots would diverge, because the limit has a kink where the other leg
+  // becomes the limiting one. The lowering is therefore filtered.
   constexpr int kRounds = 3, kMaximumHalf = 12, kMeanHalf = 20;
   std::vector<double> weights;
   for (int k = -kMeanHalf; k <= kMeanHalf; ++k) {
@@ -223,8 +226,9 @@ void PelvisPath::StayWithinReach(const FootPaths& feet) {
     }
     const std::vector<double> smooth = MovingMean(MovingMaximum(missing, kMaximumHalf), weights);
     for (int i = 0; i < kSamples; ++i) {
-      // Steps join in their states, so the pelvis must not change there. After a turn it may change
-      // at the end, because the rear foot does not have the direction of the state.
+      // Steps follow each other in states, so the pelvis must not change there. After a turn, it
+      // may change at the end, because the rear foot does not have the direction assumed in the
+      // state.
       const int to_state = timing_.shape.turn_rad == 0.0 ? std::min(i, kSamples - 1 - i) : i;
       const auto k = static_cast<std::size_t>(i);
       lowered_m_[k] += smooth[k] * SmoothStep(to_state / (0.06 * (kSamples - 1)));

@@ -12,10 +12,11 @@ namespace stridewire::builtin {
 /// Returns the sideways distance between the balls of a standing figure, in metres.
 [[nodiscard]] double StandWidthM();
 
-/// Returns the shape of a straight step from feet `start_length_m` apart to `end_length_m` apart.
+/// Returns the shape of a straight step. The feet are `start_length_m` apart at its start and
+/// `end_length_m` apart at its end.
 [[nodiscard]] StepShape StraightShape(Foot moving, double start_length_m, double end_length_m);
 
-/// Generates a step in normalised form with the parameters `names`.
+/// Generates a step with the parameters `names`. It starts at the origin with heading 0.
 [[nodiscard]] RawExample MakeStep(const Skeleton& figure, Foot moving, const StepShape& shape,
                                   std::span<const ParameterName> names, std::string source);
 

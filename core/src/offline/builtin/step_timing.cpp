@@ -18,19 +18,19 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   timing.start.ascent_m = -shape.start_m.y;
   timing.end.ascent_m = shape.end_m.y;
   const bool partial = timing.start.standing() || timing.end.standing();
-  // Sideways steps and steps on the spot have their own duration, since the leg does not swing
-  // through.
+  // Sideways steps and steps on the spot have their own duration, because the leg does not swing
+  // past the other leg.
   const bool in_place = timing.start.standing() && timing.end.standing();
   const double length_m =
       partial ? std::max(start_length_m, end_length_m) : 0.5 * (start_length_m + end_length_m);
   const double step_s =
       in_place ? 0.54 : StepTime(length_m, 0.5 * (start_rise_m + end_rise_m), shape.style);
-  // After standing, the weight first moves over the fixed foot. Before standing, the body comes to
-  // rest.
+  // A step from a stand starts with a shift of the weight over the fixed foot. A step to a stand
+  // ends when the body is at rest.
   const double weight_shift_s = in_place ? 0.20 : 0.27;
   const double settling_s = 0.12 * step_s + (in_place ? 0.10 : 0.15);
   timing.toe_off_s = timing.start.standing() ? weight_shift_s : timing.start.half_support_s;
-  // In steps from or to standing, the swing lasts the same fraction of the step as in slow walking.
+  // In steps from or to a stand, the swing takes the same fraction of the step as in slow walking.
   const auto half_support_s = [&](const GaitState& state) {
     return state.standing() ? 0.12 * step_s : state.half_support_s;
   };

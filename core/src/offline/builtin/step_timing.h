@@ -8,8 +8,8 @@
 namespace stridewire::builtin {
 
 /// The timing of a step between two states, with keytimes start, toe-off, heel-strike and end.
-/// Double support around a state is symmetric and independent of the step, so that velocities agree
-/// where steps join.
+/// Double support around a state is symmetric and independent of the step, so that successive steps
+/// have equal velocities in the state between them.
 struct StepTiming {
   StepShape shape;
   GaitState start;

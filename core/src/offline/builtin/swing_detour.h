@@ -5,13 +5,13 @@ namespace stridewire::builtin {
 /// Sideways detours that a swinging foot may take around the other foot.
 struct DetourRange {
   double max_m = 0.0;
-  double step_m = 0.0;       ///< Difference between successive detours that are tried.
-  double clearance_m = 0.0;  ///< Smallest distance between the feet at which they do not touch.
+  double step_m = 0.0;       ///< Increment between successive detours that are tried.
+  double clearance_m = 0.0;  ///< Minimum distance between the feet at which they do not touch.
 };
 
 /// Returns the smallest detour at which the feet stay `clearance_m` apart. If there is none,
-/// returns the one at which they stay farthest apart. `nearest_m` returns the smallest distance of
-/// the feet for a detour.
+/// returns the detour at which they stay farthest apart. `nearest_m` returns the smallest distance
+/// between the feet for a detour.
 template <class NearestM>
 [[nodiscard]] double FindDetour(const DetourRange& range, const NearestM& nearest_m) {
   constexpr double kSmallestGainM = 1e-3;
@@ -19,7 +19,7 @@ template <class NearestM>
   double widest_m = 0.0;
   for (double detour_m = 0.0; detour_m < range.max_m; detour_m += range.step_m) {
     const double distance_m = nearest_m(detour_m);
-    // A detour has no effect where the feet are closest at the landing.
+    // If the feet are closest at the landing, a detour has no effect.
     if (distance_m <= widest_m + kSmallestGainM) continue;
     widest_m = distance_m;
     best_m = detour_m;

@@ -3,7 +3,7 @@
 namespace stridewire::builtin {
 namespace {
 
-// Upper arms are turned inwards, so that bent elbows bring the hands in front of the body.
+// Upper arms are rotated inwards, so that bent elbows bring the hands in front of the body.
 constexpr double kInwardTurnRad = 18.0 * kDegree;
 
 DQuat YawRollLean(double yaw, double roll, double lean) {
@@ -29,7 +29,8 @@ void SetUpperBody(const UpperBody& body, double pelvis_yaw, double pelvis_roll, 
     const auto s = static_cast<std::size_t>(side);
     const double out = SideSign(side);
     const std::size_t shoulder = side == Foot::kLeft ? kLeftShoulder : kRightShoulder;
-    // The collar bone follows the arm slightly. The arms hang down from the T-pose.
+    // The collar bone slightly follows the arm. The arms hang down, whereas in the T-pose they
+    // point sideways.
     pose.rotations[shoulder] = RotateY(-out * 0.12 * body.arm_flexion[s]);
     pose.rotations[shoulder + 1] = RotateX(-body.arm_flexion[s]) *
                                    RotateZ(-out * (90.0 * kDegree - body.arm_abduction)) *

@@ -19,13 +19,13 @@ constexpr double kThoraxYawRad = 4.0 * kDegree;
 constexpr double kThoraxRollRad = 2.0 * kDegree;
 constexpr double kLeanRangeRad = 1.6 * kDegree;
 constexpr double kNodRad = 1.5 * kDegree;
-// Delays as fractions of a step.
+// The following delays are fractions of a step.
 constexpr double kArmLag = 0.05;
 constexpr double kElbowLag = 0.17;
 
 double Mix(double a, double b, double s) { return a + (b - a) * s; }
 
-// A quantity that oscillates about `middle`. All values depend on the state.
+// A quantity that oscillates about `middle`. Its values depend on the state.
 struct Oscillation {
   double middle = 0.0;
   double amplitude = 0.0;
@@ -39,7 +39,7 @@ double SlopeOf(const Oscillation& oscillation, double cycles, const GaitState& s
   return oscillation.amplitude * angle * Sin(angle * oscillation.lag) / state.step_s;
 }
 
-// Half a period per step: from one extreme to the other.
+// Creates a curve with half a period per step, from one extreme to the other.
 Curve PerStride(const StepTiming& timing, const Oscillation& start, const Oscillation& end) {
   const double first = start.middle + start.amplitude * Cos(kPi * start.lag);
   const double last = end.middle - end.amplitude * Cos(kPi * end.lag);
@@ -54,7 +54,7 @@ Curve PerStride(const StepTiming& timing, const Oscillation& start, const Oscill
   return Curve(knots);
 }
 
-// One period per step: `middle_offset` is added halfway.
+// Creates a curve with one period per step. `middle_offset` is added halfway.
 Curve PerStep(const StepTiming& timing, const Oscillation& start, const Oscillation& end,
               double middle_offset = 0.0) {
   const double low = 0.5 * (start.middle + end.middle - start.amplitude - end.amplitude);
@@ -64,7 +64,7 @@ Curve PerStep(const StepTiming& timing, const Oscillation& start, const Oscillat
 }
 
 // Perry and Burnfield, Gait Analysis: the shoulder moves between 24 degrees of extension and 8 of
-// flexion, the elbow between 20 and 45 degrees.
+// flexion, the elbow between 20 and 45 degrees of flexion.
 Oscillation Arm(const GaitState& state) {
   const double forward = Mix(kStandingArmRad, 12.0 * kDegree, state.vigour);
   const double back = Mix(kStandingArmRad, -22.0 * kDegree, state.vigour);
@@ -81,14 +81,14 @@ Oscillation Opposite(const Oscillation& oscillation) {
   return {oscillation.middle, -oscillation.amplitude, oscillation.lag};
 }
 
-// In slow walking, thorax and pelvis turn almost together; the faster the walk, the more they turn
-// against each other (van Emmerik and Wagenaar 1996).
+// In slow walking, thorax and pelvis rotate almost together. In faster walking, they rotate more in
+// opposite directions (van Emmerik and Wagenaar 1996).
 Oscillation ThoraxYaw(Foot moving, const GaitState& state) {
   return {0.0, -SideSign(moving) * kThoraxYawRad * state.vigour, Mix(0.36, 0.18, state.vigour)};
 }
 
-// The trunk leans further forward uphill and on stairs. It leans forward most shortly after
-// heel-strikes and least in single support (Krebs et al. 1992).
+// The trunk leans further forward uphill and on stairs. In a step, it leans forward most shortly
+// after heel-strikes and least in single support (Krebs et al. 1992).
 Oscillation Lean(const GaitState& state) {
   const double slope =
       state.standing() ? 0.0 : std::clamp(state.ascent_m / state.length_m, -1.0, 1.0);
@@ -96,7 +96,7 @@ Oscillation Lean(const GaitState& state) {
   return {(4.0 + 3.0 * state.speed_mps + uphill) * kDegree, kLeanRangeRad * state.vigour};
 }
 
-// A body that accelerates by a must lean by atan(a / g) to stay in balance. Trunk and legs share
+// A body with the acceleration a must lean by atan(a / g) to stay in balance. Trunk and legs share
 // this lean.
 double AccelerationLean(const StepTiming& timing) {
   constexpr double kRad_mps2 = 2.5 * kDegree;
@@ -116,8 +116,8 @@ Curve MakeThoraxRoll(Foot moving, const StepTiming& timing) {
                 {timing.end_s, 0.0, -rate(timing.end)}});
 }
 
-// The head turns down while the body is high and up while it is low, so that the eyes keep their
-// target (Pozzo, Berthoz and Lefort 1990).
+// The head nods down while the body is high and up while it is low, so that the eyes keep looking
+// at their target (Pozzo, Berthoz and Lefort 1990).
 Oscillation Nod(const GaitState& state) {
   return {0.3 * Lean(state).middle, -kNodRad * state.vigour};
 }
@@ -130,7 +130,7 @@ UpperBodyPath::UpperBodyPath(Foot moving, const StepTiming& timing)
       thorax_roll_(MakeThoraxRoll(moving, timing)),
       lean_(PerStep(timing, Lean(timing.start), Lean(timing.end), AccelerationLean(timing))),
       nod_(PerStep(timing, Nod(timing.start), Nod(timing.end))) {
-  // The moving foot is behind at the start, so the arm of its side is in front.
+  // The moving foot is behind at the start, so the arm on its side is in front.
   const auto m = static_cast<std::size_t>(moving), f = static_cast<std::size_t>(OtherFoot(moving));
   arms_[m] = PerStride(timing, Arm(timing.start), Arm(timing.end));
   arms_[f] = PerStride(timing, Opposite(Arm(timing.start)), Opposite(Arm(timing.end)));

@@ -7,14 +7,14 @@
 
 namespace stridewire::builtin {
 
-/// The motion of trunk, head and arms over a step. It does not contain the yaw of the head, which
-/// depends on the heading of the pelvis.
+/// The motion of trunk, head and arms over a step, except for the yaw of the head, which depends on
+/// the heading of the pelvis.
 ///
-///   thorax yaw   against the pelvis, later than it by a sixth to a fifth of a stride
-///   lean         grows with speed, ascent and acceleration; greatest in double support
+///   thorax yaw   opposite to the pelvis, later by a sixth to a fifth of a stride
+///   lean         grows with speed, ascent and acceleration; largest in double support
 ///   roll         towards the standing leg
 ///   arms         opposite to the legs; the elbows are later than the shoulders
-///   nod          keeps the direction of the eyes level while the body rises and falls
+///   nod          keeps the line of sight level while the body rises and falls
 class UpperBodyPath {
  public:
   UpperBodyPath(Foot moving, const StepTiming& timing);
@@ -27,7 +27,7 @@ class UpperBodyPath {
   Curve arms_[2], elbows_[2];
 };
 
-/// Returns arms, trunk and head of a standing figure.
+/// Returns the angles of arms, trunk and head of a standing figure.
 [[nodiscard]] UpperBody StandingUpperBody();
 
 }  // namespace stridewire::builtin

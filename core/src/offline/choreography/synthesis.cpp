@@ -16,8 +16,7 @@
 namespace stridewire {
 namespace {
 
-// The frames from `from_s` to `to_s`, with a tolerance of a millionth of a frame. Empty if first >
-// last.
+// The frames in [from_s, to_s], with a tolerance of a millionth of a frame. Empty if first > last.
 struct Frames {
   Frames(const Clip& clip, double from_s, double to_s)
       : first(static_cast<int>(std::ceil(from_s * clip.fps - 1e-6))),
@@ -31,8 +30,8 @@ DVec3 Ball(const MotionLibrary& library, const Clip& clip, int frame, Foot foot)
   return DVec3(BallPosition(library.skeleton(), clip.frame(frame), foot));
 }
 
-// Returns the contacts of planted feet from the plan of the movement; the landing of a step is
-// last.
+// Returns the contacts of planted feet according to the plan of the movement. The landing of a step
+// is the last one.
 std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& movement) {
   std::vector<PlantRecord> plants;
   const Foot last = IsStep(record.kind) ? MovingFoot(record.kind) : Foot::kRight;
@@ -49,7 +48,7 @@ std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& 
 }
 
 // Returns the contacts of a movement without planting, from its keytimes. The fixed foot of a step
-// stands all the time, the moving foot before toe-off and after heel-strike. In a jump both feet
+// always stands. The moving foot stands before toe-off and after heel-strike. In a jump, both feet
 // stand before toe-off and after landing.
 std::vector<PlantRecord> PlantsOf(const MovementRecord& record) {
   std::vector<PlantRecord> plants;
@@ -101,14 +100,14 @@ bool EndsWalk(const AvatarEvent& event, const std::set<std::uint64_t>& walks) {
           (event.type == AvatarEventType::kFinished && event.kind == MovementKind::kStand));
 }
 
-// Returns the path of a request in the choreography, whose list also contains layers.
+// Returns the path of a request in the choreography file, whose list also contains layers.
 std::string PathOf(std::size_t request, std::span<const LayerCue> layers) {
   const auto before =
       std::ranges::count_if(layers, [&](const LayerCue& cue) { return cue.before <= request; });
   return "movements[" + std::to_string(request + static_cast<std::size_t>(before)) + "]";
 }
 
-// Converts the rejection of a step or jump, to which no transition path leads, to an error.
+// Converts the rejection of a step or jump to which no transition path leads into an error.
 Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> requests,
                std::span<const LayerCue> layers) {
   const auto request = std::ranges::find(requests, event.request_id, &MovementRequest::id);
@@ -116,8 +115,8 @@ Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> reques
           PathOf(static_cast<std::size_t>(request - requests.begin()), layers)};
 }
 
-// Sets the layers that start before a movement, including those that have not been set before
-// earlier movements.
+// Sets the layers that start before a movement, except those that were already set for earlier
+// movements.
 Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size_t& next,
                  AvatarSimulation& avatar) {
   for (; next < layers.size() && layers[next].before <= before; ++next) {
@@ -136,7 +135,7 @@ Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size
   return {};
 }
 
-// Measures how far the foot of a step is from its requested footprint when it first stands.
+// Measures the distance between a step's requested footprint and the foot when it first stands.
 void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& requested,
                     MovementRecord& record) {
   STRIDEWIRE_CHECK(IsStep(record.kind) && !record.plants.empty());
@@ -214,7 +213,7 @@ Expected<Synthesis> Synthesize(const SynthesisInput& input) {
 
   Pose scratch(joint_count);
   GridCache cache(library->layout());
-  // Requested footprint per movement. Set only for planted steps.
+  // [movement]: requested footprint. Set only for planted steps.
   std::vector<std::optional<Footprint>> requested;
   std::set<std::uint64_t> walks;
   for (const MovementRequest& request : requests) {

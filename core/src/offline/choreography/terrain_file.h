@@ -10,7 +10,7 @@
 
 namespace stridewire {
 
-/// Largest size of a terrain file.
+/// Maximum size of a terrain file.
 inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;
 
 /// Reads a terrain from a JSON file:
@@ -22,14 +22,14 @@ inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;
 /// `height_field` and `boxes` are optional, but all keys inside them are required. Unknown keys are
 /// errors.
 ///
-/// Errors: kNotFound or kIo with the file in `where`. kMalformed with "file:line:column" if the
-/// text is not JSON. For wrong values, kMalformed or the errors of Terrain::Make with the field in
-/// `where`, for example "t.json: boxes[3].max_m". kLimitExceeded if the file exceeds
+/// Errors: kNotFound or kIo, with the file in Error::where. kMalformed, with "file:line:column", if
+/// the text is not JSON. For invalid values, kMalformed or the errors of Terrain::Make, with the
+/// field in Error::where, for example "t.json: boxes[3].max_m". kLimitExceeded if the file exceeds
 /// kMaxTerrainFileBytes.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ReadTerrain(
     const std::filesystem::path& path);
 
-/// Same as ReadTerrain, for text in memory. `name` replaces the path in errors.
+/// Reads a terrain like ReadTerrain, from text in memory. `name` replaces the path in errors.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ParseTerrain(std::string_view text,
                                                                     std::string_view name);
 

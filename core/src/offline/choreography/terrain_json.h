@@ -9,7 +9,7 @@
 namespace stridewire {
 
 /// Reads a terrain from a JSON value: the key "terrain" of a choreography, or a whole terrain file.
-/// The paths in errors start at `field`. The error codes are those of ParseTerrain.
+/// Paths in errors start with that of `field`. The error codes are those of ParseTerrain.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ReadTerrainField(const JsonField& field);
 
 }  // namespace stridewire

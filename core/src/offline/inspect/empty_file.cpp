@@ -7,8 +7,8 @@
 namespace stridewire {
 namespace {
 
-// Returns the reason that covers most of the rejected time. If several cover as much, returns the
-// first in alphabetical order.
+// Returns the reason with the largest total rejected time. If several have the same time, returns
+// the first in alphabetical order.
 std::string MainReason(const Extraction& extraction) {
   std::map<std::string, double> seconds;
   for (const RejectedTime& time : extraction.rejected) {

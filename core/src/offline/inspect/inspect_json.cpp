@@ -16,7 +16,7 @@ Json OriginsToJson(const ExampleOrigins& origins) {
 
 Json RangeToJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
 
-// `name` is the name of the range with its unit.
+// `name` is the name of the range, including its unit.
 Json AbilityToJson(const Ability& ability, const char* name) {
   Json json = OriginsToJson(ability.origins);
   json[name] = ability.is_available() ? RangeToJson(ability.range) : Json(nullptr);

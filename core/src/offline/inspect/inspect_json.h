@@ -9,9 +9,9 @@
 
 namespace stridewire {
 
-/// Returns a summary as {"sentences": [...], "steps": {...}, "starts": {"left": {...}, "right":
-/// {...}}, ..., "missing": [{"what": ..., "advice": ...}]}. Each ability has the numbers of its
-/// captured, mirrored, generated and completed examples, and its range or null.
+/// Converts a summary to JSON: {"sentences": [...], "steps": {...}, "starts": {"left": {...},
+/// "right": {...}}, ..., "missing": [{"what": ..., "advice": ...}]}. Each ability contains the
+/// numbers of its captured, mirrored, generated and completed examples, and its range or null.
 [[nodiscard]] nlohmann::ordered_json SummaryToJson(const LibrarySummary& summary);
 
 /// Returns {"passed": ..., "verdict": ..., "checks": [{"name": ..., "verdict": ..., ...}]}.

@@ -11,15 +11,15 @@
 namespace stridewire {
 namespace {
 
-// A leg is bent if its knee is further off the line from hip to ankle than this fraction of the
-// thigh, which corresponds to about 20 degrees.
+// A leg is bent if the distance of its knee from the line between hip and ankle is more than this
+// fraction of the thigh, which corresponds to about 20 degrees.
 constexpr float kBent = 0.17f;
 // A foot that points along the line from hip to ankle has no direction. If it points downward, as
 // in a swing, its direction is uncertain, because a small tilt changes it by a large angle.
 constexpr float kLeastFootPart = 0.5f;
 constexpr float kCertainFootPart = 0.8f;
 
-// Returns the forward direction of the pelvis, from the line between the hips.
+// Returns the forward direction of the pelvis, computed from the line between the hips.
 Vec3 PelvisForward(const LegRig& rig, const std::array<LegPose, 2>& legs) {
   const auto hip = [&](Foot foot) {
     const auto f = static_cast<std::size_t>(foot);
@@ -28,7 +28,7 @@ Vec3 PelvisForward(const LegRig& rig, const std::array<LegPose, 2>& legs) {
   return glm::cross(hip(Foot::kLeft) - hip(Foot::kRight), Vec3(0.0f, 1.0f, 0.0f));
 }
 
-// Returns the angle between two directions in degrees; 0 if one of them has no length.
+// Returns the angle between two directions in degrees. Returns 0 if one of them is zero.
 double DegreesBetween(const Vec3& a, const Vec3& b) {
   const float lengths = glm::length(a) * glm::length(b);
   if (lengths < 1e-6f) return 0.0;
@@ -36,8 +36,8 @@ double DegreesBetween(const Vec3& a, const Vec3& b) {
   return kDegreesPerRadian * std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
-// Returns the angle between the bend of a knee and the foot, or nothing if one has no direction.
-// `forward` is the direction of the pelvis.
+// Returns the angle between the bend of a knee and the foot. Returns nullopt if one of them has no
+// direction. `forward` is the direction of the pelvis.
 std::optional<double> KneeDegrees(const LegRig::Side& side, const LegPose& leg,
                                   const Vec3& forward) {
   const Vec3& hip = leg.positions_m[static_cast<std::size_t>(side.hip)];
@@ -72,7 +72,7 @@ SoleHeights HeightsOf(const LegRig::Side& side, const LegPose& leg, double root_
                             root_y_m + leg.toe_tip_m.y - side.toe_height_m})};
 }
 
-// Returns how far a foot hovers during a contact, from the heights of its sole in every frame.
+// Returns by how much a foot hovers during a contact, from the heights of its sole in every frame.
 double HoverOf(const PlantRecord& plant, const std::vector<double>& heights_m, double fps,
                bool has_stand) {
   constexpr double kSlack = 1e-6;

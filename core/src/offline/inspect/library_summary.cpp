@@ -14,13 +14,13 @@
 namespace stridewire {
 namespace {
 
-// Limits of the classes of steps. A stride ends at least kStrideM in front of the fixed foot. Side
-// steps move the foot at least kAsideM sideways, and further than forward or backward.
+// Limits for classifying steps. A stride ends at least kStrideM in front of the fixed foot. A side
+// step moves the foot at least kAsideM sideways, and farther sideways than forward or backward.
 constexpr double kStrideM = 0.15;
 constexpr double kBackM = 0.1;
 constexpr double kAsideM = 0.1;
 constexpr double kTurnDeg = 10.0;
-// The roll of the feet moves their balls by up to this height on level ground.
+// On level ground, the roll of a foot raises its ball by up to this height.
 constexpr double kRollM = 0.06;
 
 // Adds an example to an ability.
@@ -41,8 +41,7 @@ const Ability& Of(const LibrarySummary::Sides& sides, Foot foot) {
   return sides[static_cast<std::size_t>(foot)];
 }
 
-// Returns the source of the first of several averaged examples: "a.bvh 1-2 s" for
-// "a.bvh 1-2 s and 3 like it".
+// Returns the first source of an averaged example: "a.bvh 1-2 s" for "a.bvh 1-2 s and 3 like it".
 std::string FirstSource(std::string_view source) {
   const std::size_t end = source.ends_with(" like it") ? source.rfind(" and ") : source.npos;
   return std::string(source.substr(0, end));
@@ -69,8 +68,9 @@ class Summarizer {
   LibrarySummary Run() {
     summary_.stand_stride_m =
         std::fabs(FootVector(library_.skeleton(), library_.stand_pose(), Foot::kLeft, 0.0).z);
-    // Groups with more parameters contain the full movement: straight steps are stored without
-    // their turn. So they come first, and copies in other groups are ignored.
+    // Groups with more parameters contain the complete movement, whereas straight steps are stored
+    // without their turn. These groups are therefore read first, and copies in other groups are
+    // ignored.
     std::vector<std::size_t> order(library_.groups().size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
@@ -199,13 +199,13 @@ class Summarizer {
 constexpr const char* kMirrorAdvice =
     "Add the option --mirror to the build, or record these movements, too.";
 
-// Adds what is missing on both sides or on one of them.
+// Collects what is missing on one side or on both.
 class MissingFinder {
  public:
   explicit MissingFinder(LibrarySummary& summary) : summary_(summary) {}
 
-  // `what` is plural, for example "starts". `names` qualify the sides, for example "with the left
-  // foot". `record` says which recording contains the movement.
+  // `what` is plural, for example "starts". `names` contains a phrase per side, for example "with
+  // the left foot". `record` states which recording would contain the movement.
   void Check(const LibrarySummary::Sides& sides, const std::string& what,
              const std::array<std::string, 2>& names, const std::string& record) {
     const bool has[2] = {sides[0].is_available(), sides[1].is_available()};
@@ -272,7 +272,7 @@ std::string OriginText(const ExampleOrigins& origins) {
   return text;
 }
 
-// Returns "0.35 to 0.81 m", or "0.35 m" if the range is a point at this precision.
+// Returns "0.35 to 0.81 m", or "0.35 m" if both ends are equal at this precision.
 std::string RangeText(const ValueRange& range, const char* format, const char* unit) {
   const std::string low = Text(format, range.min);
   const std::string high = Text(format, range.max);

@@ -13,8 +13,8 @@
 namespace stridewire {
 namespace {
 
-// A request whose result is within this distance counts as met, whatever the direction of the
-// error.
+// If the result is within this distance of the request, the request is met, whatever the direction
+// of the error.
 constexpr double kMetM = 0.05;
 
 double Horizontal(const DVec3& v) { return std::hypot(v.x, v.z); }

@@ -20,9 +20,10 @@ constexpr double kFps = 30.0;
 constexpr int kSteps = 3;
 constexpr double kStandS = 0.5;
 constexpr double kGoalM = 3.0;
-// Largest deviations with which the checks pass.
+// Limits of the checks.
 constexpr double kMaxStopM = 0.03;
-constexpr double kMaxGoalM = 0.05;  // Walks that arrive are much closer to their goal (kArrivedM).
+// Walks that arrive end much closer to their goal than this (kArrivedM).
+constexpr double kMaxGoalM = 0.05;
 constexpr double kMaxKneeDeg = 60.0;
 constexpr double kMaxSoleM = 0.01;
 
@@ -77,7 +78,7 @@ class Checker {
     return true;
   }
 
-  // Returns advice for the user if walking fails. It depends on the first missing prerequisite.
+  // Returns advice for a failed walk. It depends on the first missing prerequisite.
   [[nodiscard]] std::string WalkAdvice() const {
     const bool has_left = summary_.has_steps_of(Foot::kLeft);
     if (!has_left || !summary_.has_steps_of(Foot::kRight)) {
@@ -139,7 +140,8 @@ class Checker {
         check, worst_m,
         Text("Three steps of %.2f m land within %.3f m of where they should.", steps_m_, worst_m));
     if (const char* const problem = OrderProblem(); problem != nullptr) {
-      check.measured.reset();  // Steps in another order than requested have no meaningful error.
+      // If steps are in another order than requested, there is no meaningful error.
+      check.measured.reset();
       Fail(check, Text("Three steps of %.2f m are not possible: ", steps_m_) + problem,
            WalkAdvice());
     } else if (worst != nullptr) {
@@ -279,7 +281,7 @@ class Checker {
     }
   }
 
-  // If no movement with feet on the ground was played, explains it in the check and returns true.
+  // If no movement with feet on the ground was played, explains this in the check and returns true.
   [[nodiscard]] bool SkipWithoutFeet(CheckResult& check) const {
     if (legs_.feet > 0) return false;
     check.text = library_->leg_rig().is_usable
@@ -288,7 +290,7 @@ class Checker {
     return true;
   }
 
-  // Plays a jump of mean length to measure the legs, if the library has no steps.
+  // If the library has no steps, plays a jump of mean length to measure the legs.
   void PlayJump() {
     if (legs_.feet > 0 || !summary_.jumps.is_available()) return;
     const double length_m = 0.5 * (summary_.jumps.range.min + summary_.jumps.range.max);

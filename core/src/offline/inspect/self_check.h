@@ -14,7 +14,7 @@ namespace stridewire {
 enum class CheckVerdict : std::uint8_t {
   kPassed,
   kFailed,
-  kNotApplicable,  ///< The library has no such movement; `text` says which one.
+  kNotApplicable,  ///< The library has no such movement. `text` states which one.
 };
 
 /// Returns "passed", "failed" or "not_applicable".
@@ -22,14 +22,14 @@ enum class CheckVerdict : std::uint8_t {
 
 /// The result of one check.
 struct CheckResult {
-  std::string name;   ///< For programs, for example "three_steps".
-  std::string title;  ///< For people, for example "Three plain steps".
+  std::string name;   ///< Identifier for programs, for example "three_steps".
+  std::string title;  ///< Title for users, for example "Three plain steps".
   CheckVerdict verdict = CheckVerdict::kNotApplicable;
-  std::optional<double> measured;  ///< Empty if nothing could be measured.
+  std::optional<double> measured;  ///< nullopt if nothing could be measured.
   double bound = 0.0;              ///< The check fails if `measured` is larger.
   std::string unit;                ///< Unit of `measured` and `bound`: "m" or "degrees".
-  std::string text;                ///< Sentence that states what was measured, or why nothing was.
-  std::string advice;              ///< Advice about the failure; empty if the check did not fail.
+  std::string text;    ///< Sentence that states what was measured, or why nothing was measured.
+  std::string advice;  ///< Advice for the user. Empty if the check did not fail.
 };
 
 /// The results of all checks, always in the same order.
@@ -41,18 +41,18 @@ struct SelfCheck {
 /// Plays a few movements with a library, on level ground at 30 frames per second, and checks them:
 ///
 ///   three_steps  Three steps of a comfortable length land within 0.2 m of their places.
-///   stop         After them, a stand brings the feet together within 3 cm.
+///   stop         A stand after these steps brings the feet together within 3 cm.
 ///   walk_to      A walk to a goal 3 m straight ahead arrives. If the library has no stop, the walk
 ///                ends within half a step of the goal.
 ///   knees        Knees bend forward: bent legs deviate at most 60 degrees from their feet.
 ///   soles        Soles of standing feet are at most 1 cm above the ground, and the ball of a foot
 ///                is never more than 1 cm below it.
 ///
-/// The same library always gives the same results. Takes some milliseconds to some tenths of a
-/// second. `library` must not be null.
+/// The same library always gives the same results. The checks take between some milliseconds and
+/// some tenths of a second. `library` must not be null.
 [[nodiscard]] SelfCheck CheckLibrary(const std::shared_ptr<const MotionLibrary>& library);
 
-/// Returns the whole result in one sentence, for example "Self-check passed."
+/// Returns the overall result in one sentence, for example "Self-check passed."
 [[nodiscard]] std::string DescribeVerdict(const SelfCheck& check);
 
 }  // namespace stridewire
