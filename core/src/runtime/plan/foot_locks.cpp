@@ -9,14 +9,14 @@ namespace stridewire {
 namespace {
 
 constexpr double kHalfFootWidthM = 0.04;
-// A sole rests on ground that rises up to kBumpM above its plane. Anything higher is a wall.
+// A sole rests on ground that rises up to kBumpM above its plane. Higher ground is a wall.
 constexpr double kBumpM = 0.05;
 
-// On ground that rises ahead by more than this per metre, a foot does not tilt further.
+// If the ground ahead rises by more than this per metre, a foot does not tilt further.
 constexpr double kSteepRise = 0.27;
 
-// On ground that rises steeply ahead, a foot stands on its toes with the heel off the ground.
-// Otherwise, its ankle would bend too far.
+// Lets a foot stand on its toes, with the heel off the ground. This is for ground that rises
+// steeply ahead, where the ankle would otherwise bend too far.
 void StandOnToes(const LegRig::Side& side, FootTrajectory& trajectory) {
   Vec3& normal = trajectory.normals[1];
   const DVec3 forward = RotateYaw(trajectory.to.heading_rad, DVec3(0.0, 0.0, 1.0));
@@ -29,7 +29,7 @@ void StandOnToes(const LegRig::Side& side, FootTrajectory& trajectory) {
 }
 
 // Returns the height of the ground under a sole. The sole rests on the highest bump below it. Walls
-// are ignored, because a step should not be placed on a wall in the first place.
+// are ignored, because steps do not end on walls.
 double StandingHeight(const FootSupport& support) {
   return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
 }

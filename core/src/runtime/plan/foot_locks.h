@@ -11,7 +11,7 @@
 namespace stridewire {
 
 /// Position and heading of a foot that stands between two movements, and the corrections that
-/// planting adds to the blended foot there.
+/// planting adds to the blended foot at that time.
 struct FootLock {
   Footprint print;
   double height_m = 0.0;
@@ -21,8 +21,8 @@ struct FootLock {
 };
 using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 
-/// Locks the feet where an unplanted pose has them, on the ground below them or, without terrain,
-/// at height `ground_m`.
+/// Locks the feet at their positions in an unplanted pose, on the ground below them. Without
+/// terrain, the ground is at height `ground_m`.
 [[nodiscard]] FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
                                     double ground_m, const Terrain* terrain);
 
@@ -33,7 +33,7 @@ using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 [[nodiscard]] FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side,
                                     const Footprint& print);
 
-/// Turns `movement` into one in which both feet stay locked.
+/// Changes `movement` so that both feet stay locked.
 void StandOn(const FootLocks& locks, Movement& movement);
 
 /// Returns the foot locks at a time of a planned movement at which both feet stand. `pose` is the
@@ -41,11 +41,11 @@ void StandOn(const FootLocks& locks, Movement& movement);
 [[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
                                     double time_s, ConstPoseSpan pose);
 
-/// Returns the additional height of the ball's centre above the ground on a slope. The centre is at
-/// a fixed distance from the ground plane, so the vertical distance grows with the slope.
+/// Returns the additional height of the ball's centre above the ground on a slope. The centre has a
+/// fixed distance from the ground plane, so its vertical distance increases with the slope.
 [[nodiscard]] double SlopeRise(const LegRig::Side& side, const Vec3& normal);
 
-/// Sets the height and the ground normal of a trajectory's landing from the ground there.
+/// Sets the height and the ground normal at the landing of a trajectory to those of the terrain.
 void LandOnGround(const Terrain& terrain, const LegRig::Side& side, FootTrajectory& trajectory);
 
 }  // namespace stridewire

@@ -16,29 +16,30 @@
 namespace stridewire {
 namespace {
 
-// Velocities are measured as differences over twice this time.
+// Velocities are differences between two samples, this long before and after a time.
 constexpr double kVelocityStepS = 0.004;
 
 // Fractions of the swing at which the reach of the legs is checked.
 constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
 constexpr double kMaxRootSinkM = 0.3;
 
-// Largest sideways correction per step towards the line of the walk.
+// Maximum sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
 
-// On level ground, a swinging foot stays at least this far above it. A foot that has just left the
-// ground may be kMaxSinkM below it, because its toes leave last. It is lifted by at most
-// kMaxEarlyLiftM.
+// On level ground, a swinging foot stays at least kLevelClearanceM above the ground. A foot that
+// has just left the ground may be kMaxSinkM below it, because its toes leave last. It is lifted by
+// at most kMaxEarlyLiftM.
 constexpr double kLevelClearanceM = 0.012;
 constexpr double kMaxEarlyLiftM = 0.03;
-// A foot that leaves the ground this early in the blend-in of its movement is not corrected fully.
+// A foot that leaves the ground before this fraction of the blend-in of its movement is not
+// corrected fully.
 constexpr double kLeastSettled = 0.2;
 constexpr double kMostlySettled = 0.7;
 
 // Sideways distances between the balls of the feet. A swinging foot that would pass the standing
 // foot closer than kMinPassingWidthM is pushed outward by up to kMaxPushM. This is checked while
-// the feet are within kPassingLengthM of each other in the walking direction. A step that starts or
-// lands closer than kCrossingWidthM crosses the legs intentionally. If a request does not specify
+// the feet are within kPassingLengthM of each other in the walking direction. If a step starts or
+// lands closer than kCrossingWidthM, the legs cross intentionally. If a request does not specify
 // the sideways distance, the foot lands at least kMinLandingWidthM from the other foot.
 constexpr double kMinPassingWidthM = 0.11;
 constexpr double kMinLandingWidthM = 0.05;
@@ -49,16 +50,16 @@ constexpr double kMaxPushM = 0.08;
 constexpr std::array<double, 2> kEarlySamples{0.1, 0.18};
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
-// Fractions of the time before release at which the moving foot is sampled, and fractions of the
-// swing shortly before its landing.
+// Fractions of the time before release, and of the swing shortly before landing, at which the
+// moving foot is sampled.
 constexpr std::array<double, 2> kReleaseSamples{0.6, 0.8};
 constexpr std::array<double, 3> kLandingSamples{0.9, 0.94, 0.97};
-// A landing foot may briefly be this far in the ground.
+// A landing foot may briefly be this far below the ground.
 constexpr double kMaxLandingSinkM = 0.008;
 
 // Fractions of the blend-in at which standing feet are sampled.
 constexpr std::array<double, 7> kSettleSamples{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
-// Standing feet are lifted by at most this while the difference pose fades out.
+// While the difference pose fades out, standing feet are lifted by at most this.
 constexpr double kMaxSettleLiftM = 0.05;
 
 double ValueOr(const MotionGroup& group, const ParameterValues& values, ParameterName name,
@@ -89,8 +90,8 @@ class Planner {
     }
     return feet;
   }
-  // Samples the feet at all times that the plan depends on. The movement's difference pose must be
-  // set.
+  // Samples the feet at all times that the plan depends on. The difference pose of the movement
+  // must be set.
   void SampleKeyPoses(const SwingTimes& swing) {
     const auto around = [&](double time_s, std::size_t before) {
       times_s_[before] = std::max(0.0, time_s - kVelocityStepS);
@@ -131,7 +132,7 @@ class Planner {
     return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
   }
 
-  // Chooses the base position so that, on average, the staying feet keep their positions.
+  // Chooses the base position so that the staying feet keep their positions, on average.
   void SolveBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
     std::array<double, kStanceSamples.size()> times_s;
@@ -168,11 +169,12 @@ class Planner {
       level_[f] = LevellingQuartic(above_m, ranges);
     }
   }
-  // Returns heights that keep the sole of a staying foot on the ground during the movement. Valid
-  // after SolveBase.
+  // Returns the heights that keep the sole of a staying foot on the ground during the movement.
+  // Valid after SolveBase.
   const Quartic& Level(std::size_t foot) const { return level_[foot]; }
 
-  // Chooses the footprint of a step's moving foot. Returns the foot at landing before planting.
+  // Chooses the footprint of a step's moving foot. Returns the blended foot at landing, before
+  // planting.
   BlendedFoot ChooseLanding(const FootLocks& locks, const LandingTarget& target, Foot moving) {
     const RequestPlan& request = target.request;
     FootPlan& plan = movement_.feet;
@@ -181,8 +183,8 @@ class Planner {
     const double end_heading_rad =
         movement_.base.heading_rad + movement_.heading_change_rad + movement_.extra_turn_rad;
     const DVec3 blended = RotateYaw(-end_heading_rad, EndVector(OtherFoot(moving), moving));
-    // If each foot were placed only relative to the other, the walk would drift sideways, because
-    // left and right steps of a capture are not equally wide. Steer back towards the line.
+    // Left and right steps of a capture are not equally wide. If each foot were placed only
+    // relative to the other, the walk would drift sideways. Therefore, steer back towards the line.
     const double aside_m =
         std::clamp(RotateYaw(-end_heading_rad, target.line_m - movement_.base.position_m).x,
                    -kMaxAsideM, kMaxAsideM);
@@ -232,8 +234,8 @@ class Planner {
     return landing;
   }
 
-  // Returns by how much the sole of the moving foot has to be raised from its landing to the end of
-  // the movement, so that it stands on ground at height `ground_m`.
+  // Returns by how much the sole of the moving foot must be raised between its landing and the end
+  // of the movement, so that it stands on ground at height `ground_m`.
   double LandingLevelling(Foot moving, double ground_m) const {
     const double at_landing_m = sampler_.LowestSole(kLanding, moving) - ground_m;
     const double at_end_m = sampler_.LowestSole(kBlendedEnd, moving) - ground_m;
@@ -244,14 +246,14 @@ class Planner {
     }
     const HeightRange lowest = LevellingRange(lowest_m);
     const HeightRange highest = LevellingRange(std::max(at_landing_m, at_end_m));
-    // If the foot rises or sinks a lot while it stands, it may go a little deeper.
+    // If the height of the foot changes a lot while it stands, it may sink a little deeper.
     if (lowest.min_m > highest.max_m) return std::max(highest.max_m, lowest.min_m - kMaxSinkM);
     return std::clamp(0.0, lowest.min_m, highest.max_m);
   }
 
-  // Returns by how much the soles of the blended pose have to be raised at the end of the movement,
-  // [foot], so that they stand on ground at height `ground_m`. Blends of steps that differ a lot
-  // would otherwise end with a foot above or below the ground.
+  // Returns by how much the soles of the blended pose must be raised at the end of the movement,
+  // [foot], so that they stand on ground at height `ground_m`. Otherwise, blends of very different
+  // steps would end with a foot above or below the ground.
   std::array<double, 2> EndLevelling(double ground_m) const {
     std::array<double, 2> raise_m{};
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -261,9 +263,9 @@ class Planner {
     return raise_m;
   }
 
-  // Returns the height to add to the moving foot of a step from the end of the blend-in until it
-  // leaves the ground, so that its sole stays on the ground at height `ground_m`. `start_m` is the
-  // height at the start, `settled_m` the height without levelling.
+  // Returns the height to add to the moving foot of a step between the end of the blend-in and its
+  // release, so that its sole stays on the ground at height `ground_m`. `start_m` is the height at
+  // the start, `settled_m` the height without levelling.
   double ReleaseHeight(Foot moving, double ground_m, double start_m, double settled_m) const {
     const auto settled_at = [&](double time_s) {
       return 1.0 - EaseOut((time_s - movement_.start_offset_s) / movement_.ease_out_s);
@@ -283,8 +285,8 @@ class Planner {
           LevellingRange(contact_sampler_.LowestSole(kStandingLate + i, moving) + base_m).max_m;
       raise_m = std::clamp(raise_m, std::min(least_m, most_m), most_m);
     }
-    // After the blend-in, the foot reaches this height before its heel rises: correct it by half,
-    // as far as the foot does not hover then.
+    // After the blend-in, the foot reaches this height before its heel rises. Corrects the height
+    // by half, unless the foot would then hover.
     if (raise_m < 0.0 && settled == 1.0) raise_m = std::min(0.5 * raise_m, raise_m + kMaxSinkM);
     return settled_m + raise_m;
   }
@@ -313,7 +315,7 @@ class Planner {
     return {centre + 1.0 * flat, centre + -1.0 * flat};
   }
 
-  // Computes offsets and their velocities at release and landing, so that the foot's path is
+  // Computes offsets and their velocities at release and landing, so that the path of the foot is
   // smooth.
   void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrajectory& trajectory) {
     const auto velocity_around = [&](std::size_t time) {
@@ -329,8 +331,8 @@ class Planner {
     trajectory.land_offset_m = trajectory.to.position_m - landing.ball_m;
   }
 
-  // Sets the lifts (FootTrajectory::lift_m) that the moving foot of a step without terrain needs to
-  // stay above the ground between its footprints.
+  // Sets the lifts (FootTrajectory::lift_m) that keep the moving foot of a step without terrain
+  // above the ground between its footprints.
   void LiftOverLevelGround(Foot moving) {
     std::array<double, 3>& lift_m = movement_.feet.foot(moving).lift_m;
     lift_m[kEarlyLift] =
@@ -340,7 +342,7 @@ class Planner {
   }
 
   // Lifts standing feet so that their balls and ankles do not sink into level ground while the
-  // difference pose fades out, as far as the soles do not hover then.
+  // difference pose fades out. The lift is limited so that soles do not hover.
   void LiftWhileSettling() {
     std::array<double, kSettleSamples.size()> times_s;
     for (std::size_t i = 0; i < times_s.size(); ++i) {
@@ -361,13 +363,13 @@ class Planner {
         lift.max_m =
             std::min(lift.max_m, (kMaxHoverM - raised_m - sampler_.LowestSole(i, foot)) / share);
       }
-      // If the foot would sink with one lift and hover with another, prefers the smaller one.
+      // If the foot would sink with one lift and hover with another, prefers the smaller lift.
       const auto [least, most] = std::minmax(lift.min_m, lift.max_m);
       trajectory.settle_lift_m = std::clamp(stays ? 0.0 : std::max(least, 0.0), least, most);
     }
   }
 
-  // Returns the outward push that the swinging foot needs to pass the standing leg.
+  // Returns by how much the swinging foot must be pushed outward to pass the standing leg.
   double PushAside(Foot moving) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
@@ -376,7 +378,7 @@ class Planner {
       const double heading = movement_.base.heading_rad + part * movement_.heading_change_rad;
       return RotateYaw(-heading, ball - stands);
     };
-    // A step that starts or lands across the other foot does so intentionally.
+    // If a step starts or lands across the other foot, the crossing is intentional.
     if (outward * vector(trajectory.from.position_m, 0.0).x < kCrossingWidthM ||
         outward * vector(trajectory.to.position_m, 1.0).x < kCrossingWidthM) {
       return 0.0;
@@ -385,8 +387,8 @@ class Planner {
     for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
       const double part = kSwingSamples[i];
       const double time_s = times_s_[kSwing + i];
-      const BlendedFoot blended{
-          .ball_m = sampler_.Ball(kSwing + i, moving)};  // The heading does not affect the ball.
+      const BlendedFoot blended{// The heading is not set, because it does not affect the ball.
+                                .ball_m = sampler_.Ball(kSwing + i, moving)};
       const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
       const DVec3 apart = vector(ball, part);
       if (std::fabs(apart.z) > kPassingLengthM) continue;
@@ -412,9 +414,9 @@ class Planner {
     return shift * std::min(1.0, kMaxRootShiftM / std::max(length_m, kMaxRootShiftM));
   }
 
-  // Returns by how much the root has to be lower at the end of the movement, so that both legs
-  // reach their footprints. The root then descends during the whole movement. Without this,
-  // planting would lower it abruptly just before the foot lands on a lower tread.
+  // Returns by how much the root must be lower at the end of the movement, so that both legs reach
+  // their footprints. The root then descends during the whole movement. Otherwise, planting would
+  // lower it abruptly just before the foot lands on a lower tread.
   double RootSink(Foot moving) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
     double sink_m = 0.0;
@@ -489,9 +491,9 @@ class Planner {
     return soles;
   }
 
-  // Returns the lift `lift` (FootTrajectory::lift_m) with which the moving foot is at least
-  // `clearance_m` above level ground at these fractions of its swing. `first` is the index of the
-  // first of them in times_s_.
+  // Returns the value of lift `lift` (FootTrajectory::lift_m) that keeps the moving foot at least
+  // `clearance_m` above level ground at these fractions of its swing. `first` is the index in
+  // times_s_ of the first fraction.
   double LevelLift(Foot moving, std::size_t lift, double clearance_m,
                    std::span<const double> samples, std::size_t first) const {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
@@ -517,11 +519,11 @@ class Planner {
   PoseSpan pose_;
   Movement& movement_;
   FootSampler sampler_;
-  FootSampler contact_sampler_;     // At contact_times_s_.
+  FootSampler contact_sampler_;     // Samples at contact_times_s_.
   std::array<Quartic, 2> level_{};  // [foot]
 
-  // Indices of the times that SampleKeyPoses samples. kRelease and kLanding each have one time
-  // before and one after them, for velocities.
+  // Indices of the times that SampleKeyPoses samples. For velocities, the times before and after
+  // kRelease and kLanding are sampled as well.
   static constexpr std::size_t kRelease = 1;
   static constexpr std::size_t kLanding = 4;
   static constexpr std::size_t kEarly = 6;
@@ -542,9 +544,9 @@ class Planner {
 
 namespace {
 
-// Plans the feet of a movement: for the target `target` or, if that is null, from the decision
-// `decision` that another program made. Both cases share this code, so a replica that receives the
-// decision computes the same plan.
+// Plans the feet of a movement. The plan follows from `target` or, if that is null, from
+// `decision`, which another program has made. A replica that receives the decision computes the
+// same plan, because it uses the same code.
 std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
                            const LandingDecision& decision) {
   const auto& [library, locks, source, scratch, pose, movement] = job;
@@ -595,9 +597,9 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
     const FootLock& lock = locks[f];
     trajectory.from = trajectory.to = lock.print;
     trajectory.normals.fill(lock.normal);
-    // While the difference pose fades, it moves and turns the feet. Compensate for that, so that a
-    // foot on the ground neither sinks nor turns. Only the supporting foot may sink to its rest
-    // height.
+    // While the difference pose fades out, it moves and turns the feet. This is compensated, so
+    // that a foot on the ground neither sinks nor turns. Only the supporting foot may sink to its
+    // resting height.
     const double sink_m = previous[f].ball_m.y - start[f].ball_m.y;
     const double turn_rad = WrapAngle(previous[f].heading_rad - start[f].heading_rad);
     const bool stays_down = is_step && f == x;

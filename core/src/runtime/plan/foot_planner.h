@@ -18,12 +18,13 @@ namespace stridewire {
 
 /// Target to which a movement should bring the feet.
 struct LandingTarget {
-  /// Request whose `applied` parameters or, if it has one, whose footprint must be reached exactly.
+  /// Request to satisfy exactly: its footprint if it has one, and otherwise its `applied`
+  /// parameters.
   const RequestPlan& request;
-  /// Terrain; null for level ground at the height that the library and the request determine.
+  /// Terrain. Null: level ground, whose height follows from the library and the request.
   const Terrain* terrain;
-  /// A point on the line along which the body moves. Groups without a sideways parameter are
-  /// steered back to that line.
+  /// A point on the line along which the body moves. Steps of groups without a sideways parameter
+  /// are steered back to that line.
   DVec3 line_m;
 };
 
@@ -34,10 +35,10 @@ struct BlendSource {
   std::optional<ConstPoseSpan> earlier;
 };
 
-/// Planting changes the heading of the library's step by at most this angle to match a requested
-/// footprint. For the position see RequestPlan::most_residual_m.
+/// Maximum angle by which planting turns the foot of the library's step to match a requested
+/// footprint. RequestPlan::most_residual_m is the limit for its position.
 inline constexpr double kMaxFootTurnRad = 0.35;
-/// Largest shift of the root for a step that ends in a stand.
+/// Maximum shift of the root for a step that ends in a stand.
 inline constexpr double kMaxRootShiftM = 0.4;
 
 /// Input and output of PlanFeet.
@@ -45,25 +46,25 @@ struct FootPlanJob {
   const MotionLibrary& library;
   const FootLocks& locks;  ///< Positions of the feet at the start.
   BlendSource source;
-  /// Scratch memory, whose cache may only contain rows of this movement.
+  /// Scratch memory. Its cache may only contain rows of this movement.
   FootPlanScratch& scratch;
-  PoseSpan pose;       ///< Scratch with one rotation per joint.
+  PoseSpan pose;       ///< Scratch memory with one rotation per joint.
   Movement& movement;  ///< Movement to plan. Its weights and heading must be set.
 };
 
-/// Plans the feet of a movement. Sets its base position, so that the foot that stays (for a jump:
-/// the centre of both feet) is where it stands and nothing drifts, its difference pose relative to
-/// the source, and `movement.feet`. Never allocates. Returns the feet of the blended pose with its
-/// difference pose at the start of the movement and kBlendStepS later.
+/// Plans the feet of a movement. Sets `movement.feet`, the base position and the difference pose
+/// relative to the source. The base position is chosen so that the staying foot (in a jump, the
+/// centre of both feet) keeps its place, which prevents drift. Never allocates. Returns the feet of
+/// the blended pose with its difference pose, at the start of the movement and kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingTarget& target);
 
-/// Repeats a plan from its decisions, with the same bits. The heading change of the movement is not
-/// used.
+/// Repeats a plan from its decisions, with the same bits. Does not use the heading change of the
+/// movement.
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingDecision& decision);
 
 /// Sets FootTrajectory::settle_lift_m of a planned step on level ground, so that its standing feet
-/// do not sink while the difference pose fades out. Call this when the residuals of the plan are
-/// set.
+/// do not sink while the difference pose fades out. Call it after setting the residuals of the
+/// plan.
 void LiftWhileSettling(const FootPlanJob& job);
 
 }  // namespace stridewire

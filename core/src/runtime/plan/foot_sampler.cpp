@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kBlock = kernels::kBlock;
 }
 
-// Arrays for evaluating one movement at several times, one time per lane.
+// Arrays for evaluating one movement at several times, with one time per lane.
 struct FootSamplerLanes {
   static constexpr std::size_t kJoints = LegRig::kMaxJointsOfLegs;
   kernels::GridTimes times{};
@@ -55,7 +55,7 @@ void SampleGrids(const MotionGroup& group, const Movement& movement,
   kernels::ComputeGridSamples(times_s.size(), lanes.times, lanes.samples);
 }
 
-// Collects the difference pose for the joints of the legs.
+// Extracts the difference pose of the joints of the legs.
 void CollectDifferences(const Movement& movement, std::span<const int> joints, std::size_t count,
                         FootSamplerLanes& lanes) {
   const Pose& difference = movement.difference;
@@ -94,7 +94,7 @@ void FootSampler::Sample(const Movement& movement, std::span<const double> times
   for (std::size_t i = 0; i < times_s.size(); ++i) SampleOne(movement, times_s[i], i < eased, i);
 }
 
-// Returns false if the examples' rotations of some joint may cancel each other (see
+// Returns false if the examples' rotations of a joint may cancel each other out (see
 // BlendRotations).
 bool FootSampler::SampleTogether(const Movement& movement, std::span<const double> times_s,
                                  std::size_t eased) {

@@ -13,41 +13,40 @@
 
 namespace stridewire {
 
-/// Computes the feet of a movement, before planting, at several times at once. The results have the
-/// same bits as EvaluateMovement or EvaluateBlend followed by FootOf. It evaluates the times side
-/// by side and only the joints of the legs.
+/// Computes the feet of a movement, before planting, at several times at once. Evaluates the times
+/// side by side, and only the joints of the legs. The results have the same bits as those of
+/// EvaluateMovement or EvaluateBlend followed by FootOf.
 class FootSampler {
  public:
-  static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Largest number of times per call.
+  static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Maximum number of times per call.
 
   /// Borrows both arguments. The leg rig of the scratch's library must be usable. `pose` is scratch
-  /// as well: a pose of its skeleton.
+  /// memory as well: a pose of the library's skeleton.
   FootSampler(FootPlanScratch& scratch, PoseSpan pose)
       : library_(scratch.library()), scratch_(scratch), pose_(pose) {}
 
-  /// Samples up to kMaxTimes times of a movement: the first `eased` of them with the difference
+  /// Samples a movement at up to kMaxTimes times: the first `eased` of them with the difference
   /// pose, as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache
   /// may only contain rows of this movement.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
-  /// Returns the root at the `i`th time, in world space.
+  /// Returns the root at time `i`, in world space.
   [[nodiscard]] DVec3 Root(std::size_t i) const { return DVec3(At(roots_m_, i)); }
-  /// Returns the ball of a foot at the `i`th time, in world space.
+  /// Returns the ball of a foot at time `i`, in world space.
   [[nodiscard]] DVec3 Ball(std::size_t i, Foot foot) const;
-  /// Returns a foot at the `i`th time.
+  /// Returns a foot at time `i`.
   [[nodiscard]] BlendedFoot FootAt(std::size_t i, Foot foot) const;
-  /// Returns the height of a foot at the `i`th time, in world space (LegPose::LowestSole).
+  /// Returns the height of a foot at time `i`, in world space (LegPose::LowestSole).
   [[nodiscard]] double LowestSole(std::size_t i, Foot foot) const;
-  /// Returns the height of the lower of ball and ankle, above their heights at rest.
+  /// Returns the smaller of the heights of ball and ankle, each above its height at rest.
   [[nodiscard]] double LowestFlatSole(std::size_t i, Foot foot) const;
-  /// Returns the height of the lowest of ball, ankle and tip of the toes, above their heights at
-  /// rest.
+  /// Returns the smallest of the heights of ball, ankle and toe tip, each above its height at rest.
   [[nodiscard]] double LowestPoint(std::size_t i, Foot foot) const;
 
  private:
   [[nodiscard]] bool SampleTogether(const Movement& movement, std::span<const double> times_s,
                                     std::size_t eased);
-  // Returns a leg with the positions of ankle, ball and tip of the toes only.
+  // Returns a leg in which only the positions of ankle, ball and toe tip are set.
   [[nodiscard]] LegPose LegAt(std::size_t i, Foot foot) const;
   void SampleOne(const Movement& movement, double time_s, bool is_eased, std::size_t i);
   [[nodiscard]] Vec3 At(const float (&of)[3][kMaxTimes], std::size_t i) const {
@@ -60,7 +59,7 @@ class FootSampler {
   alignas(64) float roots_m_[3][kMaxTimes];        // Positions of the root in world space.
   alignas(64) float balls_m_[2][3][kMaxTimes];     // [foot]: balls relative to the root.
   alignas(64) float ankles_m_[2][3][kMaxTimes];    // [foot]: ankles relative to the root.
-  alignas(64) float toe_tips_m_[2][3][kMaxTimes];  // [foot]: tips of the toes, likewise.
+  alignas(64) float toe_tips_m_[2][3][kMaxTimes];  // [foot]: toe tips relative to the root.
 };
 
 }  // namespace stridewire

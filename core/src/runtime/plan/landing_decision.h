@@ -7,7 +7,7 @@
 
 namespace stridewire {
 
-/// The decisions of PlanFeet. The rest of the plan follows from them without the request and the
+/// The decisions of PlanFeet. The rest of the plan follows from them, without the request and the
 /// terrain.
 struct LandingDecision {
   double extra_turn_rad = 0.0;  ///< Movement::extra_turn_rad
@@ -15,7 +15,8 @@ struct LandingDecision {
   /// [foot]: landing positions of the feet that move.
   std::array<DVec3, 2> to_m{DVec3(0.0), DVec3(0.0)};
   // The following members are used for steps only.
-  double turn_rad = 0.0;  ///< Turn of the foot at landing, relative to that of the library's step.
+  /// Turn of the foot at landing, in addition to that of the library's step.
+  double turn_rad = 0.0;
   double height_m = 0.0;  ///< Correction of the height of the blended foot at landing.
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);   ///< Ground normal at landing, on terrain.
   std::array<double, 3> lift_m{};         ///< FootTrajectory::lift_m

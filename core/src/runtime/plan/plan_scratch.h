@@ -11,7 +11,7 @@ namespace stridewire {
 struct FootSamplerLanes;
 
 /// Memory for planning the feet of a movement (PlanFeet): about 100 KB. It is allocated once and
-/// used for any number of movements of one library. One per thread.
+/// used for all movements of one library. Use one per thread.
 class FootPlanScratch {
  public:
   /// `library` must outlive the scratch.
@@ -21,7 +21,7 @@ class FootPlanScratch {
   FootPlanScratch& operator=(FootPlanScratch&&) noexcept;
 
   [[nodiscard]] const MotionLibrary& library() const { return *library_; }
-  /// Rows of the movement that is being planned. Clear it when the movement changes.
+  /// Cached rows of the movement that is being planned. Clear the cache when the movement changes.
   [[nodiscard]] GridCache& cache() { return *cache_; }
   [[nodiscard]] FootSamplerLanes& lanes() { return *lanes_; }
 
@@ -31,7 +31,7 @@ class FootPlanScratch {
   std::unique_ptr<FootSamplerLanes> lanes_;
 };
 
-/// Memory for everything that avatars plan: the feet and the weights of a movement. One per thread.
+/// Memory for planning the feet and the weights of movements. Use one per thread.
 struct PlanScratch {
   /// `library` must outlive the scratch.
   explicit PlanScratch(const MotionLibrary& library) : feet(library), correction(library) {}

@@ -10,9 +10,9 @@
 namespace stridewire {
 namespace {
 
-// The direction of a shorter path does not matter.
+// If a path is shorter than this, its direction does not matter.
 constexpr double kShortestPathM = 0.15;
-// Places within this distance are the same, whatever the directions of the paths to them.
+// Places closer than this are the same, whatever the directions of the paths to them.
 constexpr double kSamePlaceM = 0.05;
 
 double Horizontal(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }

@@ -7,17 +7,18 @@
 
 namespace stridewire {
 
-/// Conditions under which a planned movement lands.
+/// Conditions at the landing of a planned movement.
 struct LandingConditions {
-  bool plants_feet = true;   ///< Planting corrects where feet land and how far the body turns.
-  bool has_terrain = false;  ///< The terrain determines the height of the landing place.
+  /// True if planting corrects where feet land and how far the body turns.
+  bool plants_feet = true;
+  bool has_terrain = false;  ///< True if the terrain determines the height of the landing place.
 };
 
 /// The predicted result of a planned step or jump, and its difference from the request.
 struct RequestError {
   RequestTarget reached;    ///< Result of the step or jump, in the terms of its request.
   double distance_m = 0.0;  ///< Distance between the landing places, >= 0.
-  /// Angle between the paths to the landing places or between the headings, whichever is larger,
+  /// Angle between the paths to the landing places, or between the headings, whichever is larger;
   /// >= 0. Paths are compared only if the landing places differ and are not close to the start.
   double angle_rad = 0.0;
 
@@ -26,8 +27,8 @@ struct RequestError {
   }
 };
 
-/// Predicts the result of a plan from its parameters, within a few centimetres. `feet` are the feet
-/// at the start.
+/// Predicts the result of a plan from its parameters, with an error of a few centimetres. `feet`
+/// are the feet at the start.
 [[nodiscard]] RequestError ErrorOf(const MotionLibrary& library, const RequestPlan& plan,
                                    const FootState& feet, const LandingConditions& conditions);
 

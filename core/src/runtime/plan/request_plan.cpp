@@ -14,69 +14,76 @@
 namespace stridewire {
 namespace {
 
-// Costs are in metres: distances between the requested parameters and those a group can produce,
-// multiplied by a weight per parameter.
+// Costs are in metres. They are distances between the requested parameters and those that a group
+// can produce, multiplied by a weight per parameter.
 
-// The start is dictated by where the feet stand, so it counts more than the end.
+// The positions of the feet dictate the start, so it has a larger weight than the end.
 constexpr double kStartWeight = 4.0;
-// A parameter that the request does not give has a small weight, so that it follows the others.
+// Weight of a parameter that the request does not specify. It is small, so that the parameter
+// follows the others.
 constexpr double kFreeWeight = 0.02;
-// Of two groups that fit equally well, the one with fewer parameters is preferred, then the first.
+// If two groups fit equally well, the one with fewer parameters is preferred, and then the first
+// one.
 constexpr double kCostPerParameterM = 1e-3;
-// Groups whose costs differ by less than this fit equally well. Requests often lie on the edge of a
-// group, and rounding errors must not choose between it and another group.
+// Groups whose costs differ by less than this fit equally well. Requests often lie on the border of
+// a group, where rounding errors must not choose between it and another group.
 constexpr double kTieM = 1e-5;
-// A standing avatar starts with the unexpected foot only if that reduces the cost by this much.
+// A standing avatar starts with the other foot than expected only if that reduces the cost by this
+// much.
 constexpr double kFootPreferenceM = 0.01;
 
-// Extra cost of a group with turn, side or height parameters for a step that requests none of them.
-// Such parameters take arbitrary values and would bend a straight walk.
+// Additional cost of a group with turn, side or height parameters for a step that requests none of
+// them. Such parameters take arbitrary values and would bend a straight walk.
 constexpr double kStraightPreferenceM = 0.15;
-// Extra cost of a group whose steps were generated because the captures lack them. Captured steps
-// are preferred if they fit nearly as well.
+// Additional cost of a group whose steps were generated because the captures lack them. Captured
+// steps are preferred if they fit nearly as well.
 constexpr double kCompletedCostM = 0.02;
-// If a library has such groups, its captured groups cost more far from their examples. With few
-// examples and many parameters, most of the hull is far from all of them and yields poor blends.
+// In libraries with such groups, captured groups have an additional cost far from their examples.
+// With few examples and many parameters, most of the hull is far from all examples, and blends
+// there are poor.
 constexpr double kNearExampleM = 0.15;
 constexpr double kFarExampleWeight = 0.5;
-// Extra cost per metre outside the hull of the examples, even where requests may extrapolate.
+// Additional cost per metre outside the hull of the examples, where requests may extrapolate.
 constexpr double kOutsideWeight = 0.25;
-// Tolerances for the start of a step in groups without a start parameter for side or height. Such a
-// group assumes the feet of the stand pose. The side tolerance is large because people stand with
-// their feet wider apart than they walk. The height tolerance covers the roll of the feet.
+// Tolerances for the start of a step in groups without a start parameter for side or height. Such
+// groups assume that the feet are placed as in the stand pose. The side tolerance is large, because
+// people stand with their feet wider apart than they walk. The height tolerance covers the roll of
+// the feet.
 constexpr double kStartSlackM = 0.12;
 constexpr double kLevelSlackM = 0.05;
-// Cost in metres per radian of turn if no turn was requested. It is high because unwanted turns add
-// up over a walk.
+// Cost in metres per radian of turn if no turn was requested. It is high, because unwanted turns
+// add up over a walk.
 constexpr double kStraightMetresPerRadian = 2.0;
-// Weights for steps to a footprint. A sideways error costs less, because planting corrects it
-// during the swing. A turn costs more, because planting can correct little of it.
+// Weights for steps to a footprint. A sideways error has a smaller weight, because planting
+// corrects it during the swing. A turn has a larger weight, because planting can correct only a
+// small part of it.
 constexpr double kExactSideWeight = 0.4;
 constexpr double kExactMetresPerRadian = 1.0;
-// A wrong landing height leaves the foot in the air or in the ground, which is worse than landing
-// at the wrong distance.
+// A wrong landing height leaves the foot above or below the ground, which is worse than a wrong
+// distance.
 constexpr double kHeightWeight = 4.0;
-// Weight of heights at the start and end of a climbing step to a requested footprint that the best
-// step misses by more than kMaxClimbMissM, seen from above. Planting brings the foot to its height.
-// A level step that is lifted looks better than a climbing step whose length does not fit.
+// Weight of the heights at the start and end of a climbing step to a requested footprint, if the
+// best step misses it by more than kMaxClimbMissM horizontally. Planting corrects the height of the
+// foot. A level step that planting lifts looks better than a climbing step whose length does not
+// fit.
 constexpr double kClimbWeight = 0.5;
 constexpr double kMaxClimbMissM = 0.16;
 constexpr double kChangeM = 1e-6;
 
-// Captured movements that fit together have a transition distance of up to 0.125 m. A stride and a
-// movement that begins with the feet together are more than 0.2 m apart. In some captures no
-// movement begins close to the stand pose, so the limit also grows with the distance from the
-// stand.
+// Maximum transition distance between movements that may follow each other. Captured movements that
+// match have up to 0.125 m. A stride and a movement that starts with the feet together have more
+// than 0.2 m. In some captures, no movement starts close to the stand pose, so the limit also
+// increases with the distance from the stand.
 constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
 
-// Requested value of one parameter. If `given` is false, any value within the range of the examples
-// is acceptable.
+// Goal for one parameter. If `given` is false, the request does not specify it, and any value
+// within the range of the examples is acceptable.
 struct ParameterGoal {
   double value = 0.0;
   bool given = false;
   double weight = 1.0;
-  // No value is requested, but that of the stand pose is preferred.
+  // True if no value is requested, but the value of the stand pose is preferred.
   bool prefers_stand_pose = false;
 };
 using ParameterGoals = std::array<ParameterGoal, kParameterNameCount>;
@@ -95,8 +102,8 @@ bool IsGeneral(const MotionGroup& group) {
   return false;
 }
 
-// Returns the distance from a target to the box around a group's examples, grown by `growth`. It is
-// a cheap lower bound for the distance to their hull.
+// Returns the distance from a target to the bounding box of a group's examples, enlarged by
+// `growth`. It is a cheap lower bound of the distance to their hull.
 double DistanceOutsideRange(const MotionGroup& group, std::span<const double> metric,
                             std::span<const double> target, double growth) {
   // Tolerance for the different rounding of parameter ranges and examples.
@@ -112,7 +119,7 @@ double DistanceOutsideRange(const MotionGroup& group, std::span<const double> me
   return std::sqrt(sum);
 }
 
-// Returns the extra cost of a captured group in a completed library for steps with these
+// Returns the additional cost of a captured group in a completed library, for steps with these
 // parameters.
 double FarFromExamplesCost(const MotionGroup& group, std::span<const double> values) {
   double nearest = HUGE_VAL;
@@ -154,7 +161,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
     }
   }
 
-  // If the group lacks the parameter of a requested value, the whole value counts as the error.
+  // If the group lacks the parameter of a requested value, the error is the whole value.
   double missed_m = 0.0;
   for (const ParameterName name :
        {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
@@ -178,7 +185,8 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
 
   const std::span<const double> target = std::span(plan.requested.values).first(d);
   const std::span<const double> metric = std::span(metric_room).first(d);
-  // Projecting onto a hull is slow. A lower bound on the cost rules out most groups before that.
+  // Projecting onto a hull is slow. A lower bound of the cost excludes most groups without
+  // projection.
   const double cost_bound_m = DistanceOutsideRange(group, metric, target, kHullGrowth) +
                               kOutsideWeight * DistanceOutsideRange(group, metric, target, 0.0);
   if (cost_bound_m + missed_m + start_error_m + group_cost_m >= best_cost_m) return std::nullopt;
@@ -234,7 +242,7 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
   return best;
 }
 
-// Returns the distance between the requested and the applied end of a step, seen from above.
+// Returns the horizontal distance between the requested and the applied end of a step.
 double HorizontalMissM(const MotionGroup& group, const RequestPlan& plan) {
   double squared = 0.0;
   for (const ParameterName name : {ParameterName::kEndX, ParameterName::kEndZ}) {
@@ -247,7 +255,8 @@ double HorizontalMissM(const MotionGroup& group, const RequestPlan& plan) {
   return std::sqrt(squared);
 }
 
-// See PlanStep. `climb_weight` is the weight of heights at the start and end of climbing steps.
+// Implements PlanStep. `climb_weight` is the weight of the heights at the start and end of climbing
+// steps.
 std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary& library,
                                         const StepRequest& request, const FootState& feet,
                                         Foot last_moved, bool standing,
@@ -353,7 +362,8 @@ double NaturalTurn(const MotionGroup& group, const ParameterValues& values) {
   double weights = 0.0;
   for (int s = 0; s < group.example_count; ++s) {
     const auto site = group.site(s);
-    double squared = 1e-6;  // Keeps the weight of an example at this place finite.
+    // Keeps the weight of an example finite if it has exactly these parameters.
+    double squared = 1e-6;
     for (std::size_t l = 0; l < site.size(); ++l) {
       const double away = (values.values[l] - site[l]) / group.parameters[l].scale;
       squared += away * away;

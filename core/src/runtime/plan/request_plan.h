@@ -23,74 +23,78 @@ struct FootState {
 /// Target of a step or jump.
 struct RequestTarget {
   /// Steps: vector from the fixed to the moving foot at the end, in the heading after the step.
-  /// Jumps: path of the base frame, in the heading before the jump.
+  /// Jumps: displacement of the base frame, in the heading before the jump.
   DVec3 vector_m = DVec3(0.0);
   double turn_rad = 0.0;  ///< Change of heading.
 };
 
-/// A request translated to a group of the library and parameters of that group.
+/// A request expressed as a group of the library and parameters of that group.
 struct RequestPlan {
   int group = -1;
   ParameterValues requested;  ///< Parameters of the group that correspond to the request.
-  RequestTarget target;       ///< Without a requested side, `vector_m.x` is that of the feet now.
-  /// The point in the hull of the examples, grown by 10 %, that is nearest to `requested`.
+  /// Target of the request. If no side was requested, `vector_m.x` is that of the current feet.
+  RequestTarget target;
+  /// The point closest to `requested` in the hull of the examples, enlarged by 10 %.
   ParameterValues applied;
-  bool extrapolated = false;       ///< True if `applied` is outside the hull itself.
+  bool extrapolated = false;       ///< True if `applied` is outside the original hull.
   std::optional<Footprint> exact;  ///< Footprint requested by a step.
-  /// Largest error of the footprint that planting distributes over the swing.
+  /// Maximum error of the footprint that planting distributes over the swing.
   double most_residual_m = 0.25;
-  std::optional<DVec3> root_m;     ///< Steps: position of the root at the end, seen from above.
+  std::optional<DVec3> root_m;     ///< Steps: horizontal position of the root at the end.
   std::optional<double> turn_rad;  ///< Steps: the requested change of heading.
-  /// Steps: largest turn in addition to that of the examples, to meet `turn_rad`.
+  /// Steps: maximum turn in addition to that of the examples, to meet `turn_rad`.
   double max_extra_turn_rad = kMaxExtraTurnRad;
   bool is_side_given = false;  ///< Steps: true if the request specified the side.
-  bool is_varied = true;       ///< Steps: true if the step may deviate (see StrideVariation).
-  /// Largest playback speed. The movement is played as fast as is needed to shorten it to
+  bool is_varied = true;       ///< Steps: true if the step may be varied (see StrideVariation).
+  /// Maximum playback speed. The movement is played only as fast as is necessary to shorten it to
   /// kQuickStepS.
   double max_rate = 1.0;
   /// True if `applied` differs from `requested` by more than 1e-6.
   bool clamped = false;
-  /// Distance of `applied` from `requested` in metres; a radian counts as 0.5 m.
+  /// Distance between `applied` and `requested` in metres. A radian counts as 0.5 m.
   double distance_m = 0.0;
-  /// Value of `distance_m` plus costs for extrapolation and for the positions of the feet.
+  /// `distance_m` plus costs for extrapolation and for the positions of the feet.
   double cost_m = 0.0;
 };
 
-/// Requests may extrapolate this far beyond the examples. Extrapolating by 0.2 m costs 80 mm of
-/// accuracy.
+/// Requests may be outside the hull of the examples by this fraction of its size. Extrapolation by
+/// 0.2 m costs 80 mm of accuracy.
 inline constexpr double kHullGrowth = 0.1;
 
-/// Largest distance between the end of a library's step and a footprint beside the other foot, or
-/// at the goal of a walk, that planting may distribute over the swing. Libraries without steps in
-/// place can only close their feet and turn on the spot in this way.
+/// Maximum distance between the end of a library's step and its footprint that planting may
+/// distribute over the swing, for footprints beside the other foot or at the goal of a walk. In
+/// libraries without steps in place, this is the only way to close the feet and to turn on the
+/// spot.
 inline constexpr double kMaxPlantedErrorM = 0.6;
 
-/// Limits for steps of avatars in a hurry. In captures, the quickest steps of people who turn, stop
-/// or walk briskly take 0.4 to 0.5 s.
+/// Limits for the steps of avatars in a hurry. In captures, the quickest steps of people who turn,
+/// stop or walk briskly take 0.4 to 0.5 s.
 inline constexpr double kQuickStepS = 0.5;
 inline constexpr double kHurriedRate = 1.6;
 
-/// Plans a step in the group that spans it best, with parameters clamped to its hull. The start,
-/// which is given by the feet, has a larger weight than the end. A requested value (turn, side,
-/// height) for which a group has no parameter counts as missed. If the request does not name a
-/// foot, it is the foot other than `last_moved`, unless the avatar is `standing` and `last_moved`
-/// fits better. If `after` is given, only groups that may follow that group are considered
-/// (MayFollow). Returns nullopt if the library has no such step of that foot.
+/// Plans a step in the group that covers it best, with parameters clamped to the hull of the group.
+/// The feet dictate the start, which has a larger weight than the end. If a group has no parameter
+/// for a requested turn, side or height, the whole value counts as the error.
+///
+/// If the request does not specify a foot, the foot other than `last_moved` moves. If the avatar is
+/// `standing` and `last_moved` fits better, that foot moves. If `after` is set, only groups that
+/// may follow that group are considered (MayFollow). Returns nullopt if the library has no such
+/// step of that foot.
 [[nodiscard]] std::optional<RequestPlan> PlanStep(const MotionLibrary& library,
                                                   const StepRequest& request, const FootState& feet,
                                                   Foot last_moved, bool standing,
                                                   std::optional<std::size_t> after = std::nullopt);
 
-/// Returns true if a movement of group `to` may follow one of group `from`: their
-/// Transition::distance_m is at most 0.15 m, or at most 1.5 times the distance of `to` from the
-/// stand. After a stand, whose index is the number of groups, every movement is possible.
+/// Returns true if a movement of group `to` may follow one of group `from`. Their
+/// Transition::distance_m must be at most 0.15 m, or at most 1.5 times the distance between `to`
+/// and the stand. After a stand, whose index is the number of groups, every movement is possible.
 [[nodiscard]] bool MayFollow(const MotionLibrary& library, std::size_t from, std::size_t to);
 
-/// Origin of a footprint: a request, or a walk, which can choose another one if no step fits.
+/// Origin of a footprint. A walk can choose another footprint if no step fits; a request cannot.
 enum class FootprintUse { kRequested, kWalk };
 
-/// Plans a step to a footprint in world space, by translating it to a request relative to the foot
-/// that stays, which is at `fixed_m`. `print.heading_rad` must be unwrapped to be close to
+/// Plans a step to a footprint in world space, by converting it to a request relative to the
+/// staying foot, which is at `fixed_m`. `print.heading_rad` must be unwrapped to be close to
 /// `heading_rad`, the heading of the body.
 [[nodiscard]] std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
                                                        const Footprint& print, const DVec3& fixed_m,
@@ -101,9 +105,9 @@ enum class FootprintUse { kRequested, kWalk };
 [[nodiscard]] std::optional<RequestPlan> PlanJump(const MotionLibrary& library,
                                                   const JumpRequest& request);
 
-/// Returns the change of heading that a movement of a group produces without an extra turn. Groups
-/// without a turn parameter turn by what their examples turn on average, weighted by the distance
-/// from them.
+/// Returns the change of heading of a movement without an extra turn. In groups without a turn
+/// parameter, this is the mean turn of the examples, weighted by their distance from the
+/// parameters.
 [[nodiscard]] double NaturalTurn(const MotionGroup& group, const ParameterValues& values);
 
 }  // namespace stridewire

@@ -10,16 +10,16 @@
 namespace stridewire {
 namespace {
 
-// The blend from the previous pose accelerates the root by at most kMaxAccelerationMPerS2, unless
-// it would then take longer than kMaxApproachS. In captures of starts and stops, the acceleration
-// of blend and movement together is 4 to 4.6 m/s2.
+// Maximum acceleration of the root in the blend from the previous pose, unless the blend would then
+// take longer than kMaxApproachS. In captures of starts and stops, the acceleration of blend and
+// movement together is 4 to 4.6 m/s2.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
 constexpr double kMaxApproachS = 0.8;
-// Vertical accelerations count less, because climbing legs push the body up.
+// Vertical accelerations have a smaller weight, because climbing legs push the body up.
 constexpr double kVerticalWeight = 0.4;
-// On terrain the blend is shorter, because a leg that climbs or descends reaches less far.
+// On terrain the blend is shorter, because a climbing or descending leg has less reach.
 constexpr double kMaxTerrainApproachS = 0.35;
-// In strides it is shorter, too. The pelvis would otherwise be behind its place when it passes the
+// In strides the blend is shorter, too. Otherwise, the pelvis would lag behind when it passes the
 // standing foot, where each centimetre bends the knee by several degrees.
 constexpr double kMaxStrideApproachS = 0.35;
 constexpr double kApproachStepS = 0.02;
@@ -27,12 +27,12 @@ constexpr double kApproachToleranceS = 1e-7;
 
 double HorizontalLength(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 
-// Returns the length of an acceleration, in which a vertical part counts less.
+// Returns the length of an acceleration, with a smaller weight of its vertical component.
 double WeightedLength(const DVec3& v) {
   return std::max(HorizontalLength(v), kVerticalWeight * std::fabs(v.y));
 }
 
-// Returns the largest acceleration of the cubic curve that begins at `offset_m` with velocity
+// Returns the maximum acceleration on the cubic curve that starts at `offset_m` with velocity
 // `offset_m_s` and comes to rest at 0 after `over_s`.
 double PeakAcceleration(const DVec3& offset_m, const DVec3& offset_m_s, double over_s) {
   const DVec3 bend = 6.0 / (over_s * over_s) * offset_m;
@@ -40,9 +40,9 @@ double PeakAcceleration(const DVec3& offset_m, const DVec3& offset_m_s, double o
   return std::max(WeightedLength(bend + 2.0 * slope), WeightedLength(bend + slope));
 }
 
-// Returns the shortest time from `least_s` to `most_s` in which the root can go from `offset_m`
-// with velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2. Bisects between
-// two steps of the search, so that a rounding error does not change the result by a whole step.
+// Returns the shortest time in [least_s, most_s] in which the root can move from `offset_m` with
+// velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2. Bisects the last
+// step of the search, so that a rounding error does not change the result by a whole step.
 double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least_s, double most_s) {
   const auto exceeds = [&](double over_s) {
     return PeakAcceleration(offset_m, offset_m_s, over_s) > kMaxAccelerationMPerS2;
@@ -63,7 +63,7 @@ double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least
 }
 
 // Returns true if the feet are apart in the walking direction at the start and end of a step. Uses
-// the heading at the start for both: replicas do not know how far the examples turn.
+// the heading at the start for both, because replicas do not know by how much the examples turn.
 bool IsStride(const FootPlan& plan, double heading_rad) {
   const auto ahead_m = [&](const Footprint& left, const Footprint& right) {
     return std::fabs(RotateYaw(-heading_rad, left.position_m - right.position_m).z);
@@ -91,8 +91,8 @@ void PlanRootApproach(const FootPlanJob& job) {
     }
     return root;
   };
-  // On terrain, the root also approaches its height if it rises. The legs of an avatar that has
-  // climbed would otherwise straighten while the difference pose fades out.
+  // On terrain, the root also approaches its height if it rises. Otherwise, the legs of an avatar
+  // that has climbed would straighten while the difference pose fades out.
   const bool rises = plan.keeps_above_ground && above_feet(0).y < above_feet(2).y;
   const auto offset_at = [&](std::size_t i) {
     DVec3 offset = above_feet(i) - above_feet(i + 2);
@@ -112,7 +112,8 @@ void PlanRootApproach(const FootPlanJob& job) {
   const double most_s = std::min(longest_s, movement.duration_s() - start_s);
   DVec3 residual_m = plan.root_residual_m;
   DVec3 residual_m_s = plan.root_residual_m_s;
-  residual_m.y = residual_m_s.y = 0.0;  // Fades over kRootRisePart of the movement.
+  // The vertical component fades over kRootRisePart of the movement.
+  residual_m.y = residual_m_s.y = 0.0;
   plan.root_approach = {.offset_m = offset_m,
                         .offset_m_s = offset_m_s,
                         .over_s = ApproachTime(offset_m + residual_m, offset_m_s + residual_m_s,

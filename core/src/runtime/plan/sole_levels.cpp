@@ -3,7 +3,7 @@
 namespace stridewire {
 namespace {
 
-// Returns the quartic that has these values at kLevelSamples, by Newton's forward differences.
+// Returns the quartic with these values at kLevelSamples, computed by Newton's forward differences.
 Quartic QuarticThrough(std::array<double, kLevelSamples.size()> values) {
   const double constant = values[0];
   std::array<double, 4> d{};
@@ -29,15 +29,15 @@ double Levelling(double above_m) {
   return std::clamp(0.0, range.min_m, range.max_m);
 }
 
-// The quartic levels the sole at five samples. If it is out of range at others, it is projected
-// onto one range after the other (Kaczmarz).
+// The quartic levels the sole at five samples. If it is out of range at other samples, it is
+// projected onto one range after the other (Kaczmarz).
 Quartic LevellingQuartic(const std::array<double, kStanceSamples.size()>& above_m,
                          const std::array<HeightRange, kStanceSamples.size()>& ranges) {
   constexpr int kSweeps = 20;
   std::array<double, kLevelSamples.size()> values;
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = Levelling(above_m[kLevelSamples[i]]);
   Quartic level = QuarticThrough(values);
-  // The heights to add are a sum of the Legendre polynomials on [0, 1].
+  // The added heights are a sum of the Legendre polynomials on [0, 1].
   using Values = std::array<double, 5>;
   Values added{};
   const auto basis = [](double u) -> Values {

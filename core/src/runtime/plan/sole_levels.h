@@ -6,15 +6,16 @@
 
 namespace stridewire {
 
-// Standing soles may be this far above and below the ground, because the height of the sole is not
-// known exactly from a capture. If the distance is larger, the height of the foot is corrected by
-// up to kMaxLevelM. Larger differences are not errors of the blend.
+// Standing soles may be up to kMaxHoverM above and kMaxSinkM below the ground, because captures do
+// not determine the height of the sole exactly. Beyond these limits, the height of the foot is
+// corrected by up to kMaxLevelM. Larger differences are not errors of the blend.
 inline constexpr double kMaxHoverM = 0.006;
 inline constexpr double kMaxSinkM = 0.003;
 inline constexpr double kMaxLevelM = 0.05;
 
-// Fractions of the stance at which the standing foot is sampled, and the indices of those at which
-// it is levelled. At the others it may be kStanceSlackM beyond the limits.
+// kStanceSamples are fractions of the stance at which a standing foot is sampled. The sole is
+// levelled at the samples with the indices kLevelSamples. At the other samples it may exceed the
+// limits by kStanceSlackM.
 inline constexpr std::array<double, 16> kStanceSamples{
     0.0, 0.04, 0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.58, 0.67, 0.75, 0.83, 0.9, 0.95, 0.98, 1.0};
 inline constexpr std::array<std::size_t, 5> kLevelSamples{0, 4, 7, 10, 15};
@@ -31,21 +32,21 @@ struct Quartic {
   }
 };
 
-/// Range of heights to add to a sole.
+/// Range of heights that may be added to a sole.
 struct HeightRange {
   double min_m = 0.0;
   double max_m = 0.0;
 };
 
-/// Returns by how much a sole may be raised that is `above_m` above the ground. Afterwards it may
-/// be `slack_m` beyond the usual limits.
+/// Returns the range of heights by which to raise a sole that is `above_m` above the ground, so
+/// that it exceeds the usual limits by at most `slack_m`.
 [[nodiscard]] HeightRange LevellingRange(double above_m, double slack_m = 0.0);
 
-/// Returns by how much a sole has to be raised that is `above_m` above the ground.
+/// Returns by how much a sole that is `above_m` above the ground must be raised.
 [[nodiscard]] double Levelling(double above_m);
 
-/// Returns heights that keep a sole on the ground during a stance. `above_m` are its heights above
-/// the ground at kStanceSamples, and `ranges` the heights that may be added there.
+/// Returns heights that keep a sole on the ground during a stance. `above_m` are the heights of the
+/// sole above the ground at kStanceSamples. `ranges` are the heights that may be added there.
 [[nodiscard]] Quartic LevellingQuartic(
     const std::array<double, kStanceSamples.size()>& above_m,
     const std::array<HeightRange, kStanceSamples.size()>& ranges);

@@ -9,12 +9,12 @@ namespace stridewire {
 namespace {
 
 // In mid-swing, a foot is at least kClearanceM above the highest ground within kPassingRadiusM,
-// unless a lift would have to exceed kMaxLiftM.
+// unless this requires a lift above kMaxLiftM.
 constexpr double kClearanceM = 0.037;
 constexpr double kPassingRadiusM = 0.02;
-// The middle lift may be negative if the foot has to rise elsewhere in the swing. It then lowers
-// the foot by at most the largest missing clearance or, if that is more, by kMiddleSinkPerClimb
-// times the difference in height between the footprints. It never exceeds kMaxMiddleSinkM.
+// The middle lift may be negative if the foot has to rise elsewhere in the swing. It lowers the
+// foot by at most the larger of two values: the largest missing clearance, and kMiddleSinkPerClimb
+// times the height difference between the footprints. It never exceeds kMaxMiddleSinkM.
 constexpr double kMiddleSinkPerClimb = 0.5;
 constexpr double kMaxMiddleSinkM = 0.2;
 // If a lift exceeds kNoticeableLiftM, ChooseSwing also tries to shift the middle of the swing
@@ -34,9 +34,9 @@ struct SwingLifts {
   double cost_m = HUGE_VAL;
 };
 
-// Returns the cost of a swing whose ball has the heights `heights_m`: its peak above the higher
-// footprint, plus the largest slope between neighbouring samples times kSteepnessWeight. `from_m`
-// and `to_m` are the heights of the footprints.
+// Returns the cost of a swing in which the ball has the heights `heights_m`: its peak above the
+// higher footprint, plus the maximum slope between neighbouring samples times kSteepnessWeight.
+// `from_m` and `to_m` are the heights of the footprints.
 double SwingCost(const SwingValues& heights_m, double from_m, double to_m) {
   double peak_m = std::max(from_m, to_m);
   double steepest_m = 0.0;
@@ -55,9 +55,10 @@ double SwingCost(const SwingValues& heights_m, double from_m, double to_m) {
 }
 
 // Returns the lifts with the lowest cost that together raise the foot by at least
-// `missing_clearance_m` at each sample of the swing, as far as no lift exceeds kMaxLiftM. A
-// negative missing clearance is the height by which the foot may be lowered. `heights_m` are the
-// heights of the ball without lifts, `from_m` and `to_m` those of the footprints.
+// `missing_clearance_m` at each sample of the swing. If this is impossible because lifts are
+// limited to kMaxLiftM, they raise it as far as possible. A negative missing clearance is a height
+// by which the foot may be lowered. `heights_m` are the heights of the ball without lifts, `from_m`
+// and `to_m` those of the footprints.
 SwingLifts LowestLifts(const SwingValues& missing_clearance_m, const SwingValues& heights_m,
                        double from_m, double to_m) {
   constexpr int kMiddleLifts = 24;
@@ -66,10 +67,10 @@ SwingLifts LowestLifts(const SwingValues& missing_clearance_m, const SwingValues
     std::ranges::transform(kClearanceSamples, shares[lift].begin(),
                            [lift](double swing) { return LiftShare(lift, swing); });
   }
-  // The loop tries several middle lifts. For each of them, the smallest sufficient early lift
-  // follows from the first half of the swing, and the smallest late lift from the second half. The
-  // early and late lifts also raise the middle of the swing. A negative middle lift compensates for
-  // that if the clearance there is more than sufficient.
+  // The loop tries several middle lifts. For each of them, the first half of the swing determines
+  // the smallest sufficient early lift, and the second half the smallest late lift. Both also raise
+  // the middle of the swing. If the clearance there is then more than sufficient, a negative middle
+  // lift compensates for that.
   const double most_missing_m = std::max(std::ranges::max(missing_clearance_m), 0.0);
   const double most_m = std::min(1.5 * most_missing_m, kMaxLiftM);
   const double climb_m = kMiddleSinkPerClimb * std::fabs(to_m - from_m);
@@ -107,7 +108,7 @@ SwingLifts LiftsOver(const SwingSoles& soles, const FootTrajectory& trajectory,
   for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
     const double swing = kClearanceSamples[i];
     const double across = 4.0 * swing * (1.0 - swing);
-    // The required clearance and radius decrease toward the footprints, because a footprint may be
+    // The required clearance and radius decrease towards the footprints, because a footprint may be
     // close to a riser.
     const double away = LiftShare(kMiddleLift, swing);
     const double radius_m = kPassingRadiusM * (0.25 + 0.75 * away);

@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-/// Largest value of each entry of FootTrajectory::lift_m. The curves of the three lifts overlap, so
-/// the foot can rise by more than this.
+/// Maximum of each entry of FootTrajectory::lift_m. The curves of the three lifts overlap, so the
+/// foot can rise further than this.
 inline constexpr double kMaxLiftM = 0.4;
 /// Indices into FootTrajectory::lift_m.
 inline constexpr std::size_t kEarlyLift = 0;
@@ -28,8 +28,8 @@ using SwingValues = std::array<double, kClearanceSamples.size()>;
 
 /// The sole of a swinging foot during a swing whose lifts are zero.
 struct SwingSoles {
-  /// [index in kClearanceSamples]: positions of ball, heel and toe tip in world space. Each height
-  /// is reduced by the height that the point has above the ground when the foot stands flat.
+  /// [index in kClearanceSamples]: positions of ball, heel and toe tip in world space. From each
+  /// height, the height of the point in a flat, standing foot has been subtracted.
   std::array<std::array<DVec3, 3>, kClearanceSamples.size()> points_m;
   SwingValues balls_m;  ///< Heights of the balls in `points_m`.
 };
@@ -41,8 +41,8 @@ struct SwingPath {
 };
 
 /// Returns the lowest and flattest path on which the sole clears the ground. If the foot has to
-/// rise, the path may also move it up to 0.12 m forward or backward in the middle of the swing, so
-/// that it passes the edge of a tread where it is higher.
+/// rise, the path may also shift it by up to 0.12 m forward or backward in the middle of the swing.
+/// It then passes the edge of a tread at a time at which it is higher.
 [[nodiscard]] SwingPath ChooseSwing(const SwingSoles& soles, const FootTrajectory& trajectory,
                                     const Terrain& terrain);
 

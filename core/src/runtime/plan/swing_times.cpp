@@ -9,7 +9,7 @@ namespace stridewire {
 namespace {
 
 // In captures, the ball of a foot leaves the ground kBallLeavesS before toe-off and comes to rest
-// kBallRestsS after heel-strike, both at the playback speed of the captures.
+// kBallRestsS after heel-strike, at the playback speed of the captures.
 constexpr double kBallLeavesS = 0.06;
 constexpr double kBallRestsS = 0.08;
 constexpr double kShortestSwingS = 0.05;

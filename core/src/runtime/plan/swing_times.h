@@ -5,7 +5,7 @@
 
 namespace stridewire {
 
-/// Times at which the moving feet leave the ground and land, whether planted or not.
+/// Times at which the moving feet leave the ground and land, with or without planting.
 struct SwingTimes {
   double release_s = 0.0;
   double land_s = 0.0;
@@ -14,7 +14,8 @@ struct SwingTimes {
 /// Returns the swing times of a movement.
 [[nodiscard]] SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement);
 
-/// Returns the time of a phase: 0 is the start of the movement, 1 the release and 2 the landing.
+/// Returns the time of a phase. Phase 0 is the start of the movement, 1 the release and 2 the
+/// landing.
 [[nodiscard]] double TimeAtPhase(const SwingTimes& swing, double phase);
 
 }  // namespace stridewire

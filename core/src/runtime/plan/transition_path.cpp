@@ -13,10 +13,10 @@ namespace {
 
 constexpr double kFeetApartAsideM = 0.3;
 
-// Planting can distribute an error of this size over a swing (RequestPlan::most_residual_m).
+// Planting can distribute an error up to this size over a swing (RequestPlan::most_residual_m).
 constexpr double kMaxStartErrorM = 0.25;
-// An inserted step must reduce the cost of a request by at least this much: kMinStepGainM for
-// steps, kMinClosingGainM for jumps, whose cost is the distance between the feet.
+// Minimum reduction of a request's cost by an inserted step: kMinStepGainM for steps,
+// kMinClosingGainM for jumps, whose cost is the distance between the feet.
 constexpr double kMinStepGainM = 0.25;
 constexpr double kMinClosingGainM = 0.03;
 
@@ -38,8 +38,8 @@ class TransitionPathFinder {
     const TransitionPath without_insertion{can_start ? direct : std::nullopt};
     if (can_start && !StartsWithFeetApart(*direct, stance)) return without_insertion;
     if (const auto other = FindOtherGroup(direct, stance)) return {other};
-    // If the request can begin now, one inserted step may improve it. If it cannot, insert as many
-    // steps as it needs.
+    // If the request can begin now, one inserted step may improve it. Otherwise, the search inserts
+    // the number of steps that the request needs.
     const double max_cost_m = can_start && IsInReach(*direct, stance)
                                   ? MaxCostAfterStepM(CostM(*direct, stance))
                                   : HUGE_VAL;
@@ -53,7 +53,7 @@ class TransitionPathFinder {
 
  private:
   // If the group of a step may not follow the previous movement, returns the best plan in a group
-  // that may. A captured stride and a generated one can differ too much, for example.
+  // that may. Captured and generated strides, for example, can be too different.
   std::optional<RequestPlan> FindOtherGroup(const std::optional<RequestPlan>& direct,
                                             const Stance& stance) const {
     if (step_ == nullptr || !direct ||
@@ -119,7 +119,7 @@ class TransitionPathFinder {
   }
 
   // Returns true if the feet are apart and the movement is a jump or a step of the foot that moved
-  // last. Then the other foot should step first.
+  // last. In this case, the other foot should step first.
   bool StartsWithFeetApart(const RequestPlan& plan, const Stance& stance) const {
     const MovementKind kind = library_.group(plan.group).kind;
     return AreFeetApart(stance.feet, stand_) &&
@@ -136,8 +136,8 @@ class TransitionPathFinder {
                      plan.applied.values[static_cast<std::size_t>(l)]);
   }
 
-  // Returns the cost of a request in metres. For a jump this is how much further apart the feet are
-  // than in a stand.
+  // Returns the cost of a request in metres. For a jump, this is the distance by which the feet are
+  // further apart than in a stand.
   double CostM(const RequestPlan& plan, const Stance& stance) const {
     if (jump_ == nullptr) return plan.cost_m;
     const DVec3 apart = stance.feet.left_from_right_m - stand_.left_from_right_m;
@@ -145,7 +145,7 @@ class TransitionPathFinder {
         {0.0, std::fabs(apart.z) - kFeetApartForwardM, std::fabs(apart.x) - kFeetApartAsideM});
   }
 
-  // Returns the highest cost after an inserted step at which inserting the step is worthwhile.
+  // Returns the maximum cost after an inserted step at which inserting the step is worthwhile.
   double MaxCostAfterStepM(double cost_m) const {
     return jump_ != nullptr ? std::max(0.0, cost_m - kMinClosingGainM) : cost_m - kMinStepGainM;
   }

@@ -10,7 +10,7 @@
 
 namespace stridewire {
 
-/// Largest number of steps in a row that an avatar inserts before a movement that cannot start
+/// Maximum number of successive steps that an avatar inserts before a movement that cannot start
 /// without them, or before a stand.
 inline constexpr int kMaxInsertedSteps = 3;
 
@@ -26,43 +26,43 @@ inline constexpr int kMaxInsertedSteps = 3;
 struct Stance {
   FootState feet;
   Foot last_moved = Foot::kRight;
-  /// Group of the previous movement, or the number of groups after a stand.
+  /// Group of the previous movement. After a stand, the number of groups.
   std::size_t group = 0;
   int inserted_steps = 0;  ///< Number of steps inserted so far.
   LandingConditions conditions;
 };
 
-/// The next movement on the path to a requested step or jump: the request itself, or a step to
-/// insert before it.
+/// The next movement on the path to a requested step or jump. It is either the request itself or an
+/// inserted step.
 struct TransitionPath {
-  std::optional<RequestPlan> plan;  ///< Plan of the next movement. Empty if there is no path.
+  std::optional<RequestPlan> plan;  ///< Plan of the next movement. nullopt if there is no path.
   bool is_inserted = false;
 };
 
 /// Finds the path with the fewest inserted steps, at most kMaxInsertedSteps. Each inserted step
 /// brings a foot beside the other one, or as close to it as the library allows. `direct` is the
-/// plan of the request from here.
+/// plan of the request from the current stance.
 ///
-/// - A movement may follow another if MayFollow is true for their groups. If the group that suits a
-///   step best may not follow, the step uses the best group that may, if the request is in reach
-///   with it.
+/// - A movement may follow another if MayFollow is true for their groups. If the best group for a
+///   step may not follow, the step uses the best group that may, provided that the request is then
+///   in reach.
 /// - If the feet are apart, they must come together before a jump, and before a step of the foot
-///   that moved last. They need not if they are within 0.25 m of their positions in the movement's
-///   examples. Then a step is inserted only if it brings the feet closer together by 3 cm or
-///   reduces the cost of the request by 0.25 m.
-/// - Steps to footprints are never preceded by inserted steps.
+///   that moved last. This is not necessary if they are within 0.25 m of their positions in the
+///   movement's examples. In this case, a step is inserted only if it brings the feet closer
+///   together by 3 cm or reduces the cost of the request by 0.25 m.
+/// - No steps are inserted before steps to footprints.
 /// - No step is inserted if the request would still be out of reach after it (RequestError). The
 ///   plan of a request that begins at once may be out of reach.
 ///
-/// Breadth-first search with at most 14 calls of PlanStep and 15 more for the request. Never
-/// allocates.
+/// The search is breadth-first, with at most 14 calls of PlanStep and 15 more for the request.
+/// Never allocates.
 [[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library,
                                                 const MovementRequest& request,
                                                 const std::optional<RequestPlan>& direct,
                                                 const Stance& stance);
 
-/// Returns the reason why there is no path, for example "this library has no transition path from
-/// step_left to jump". Static storage.
+/// Returns why there is no path, for example "this library has no transition path from step_left to
+/// jump". The text is in static storage.
 [[nodiscard]] const char* NoPathReason(MovementKind from, MovementKind to);
 
 }  // namespace stridewire

@@ -18,33 +18,33 @@ namespace {
 // A foot within this distance and angle of its footprint at the goal has arrived.
 constexpr double kArrivedM = 0.002;
 constexpr double kArrivedRad = 0.004;
-// The same tolerances without planting. Feet then land wherever the blend puts them.
+// The same tolerances without planting. In this case feet land wherever the blend puts them.
 constexpr double kRoughlyArrivedM = 0.15;
 constexpr double kRoughlyArrivedRad = 0.25;
 
-// Largest distance between the library's own step and the footprint, which planting distributes
-// over the swing. kMaxPlantedErrorM applies to small steps and to steps that were chosen by
-// comparison. Such a step costs kErrorWeight for each metre beyond the smaller limit.
+// Maximum distance between the library's own step and the footprint, which planting distributes
+// over the swing. For small steps, and for steps that were chosen by comparison, the maximum is
+// kMaxPlantedErrorM. Each metre between both limits has the cost kErrorWeight.
 constexpr double kMaxErrorM = 0.16;
 constexpr double kErrorWeight = 0.35;
-// Largest difference in height, for libraries that have climbing steps.
+// Maximum difference in height, for libraries with climbing steps.
 constexpr double kMaxErrorHeightM = 0.08;
-// Largest error of the heading of the body after the step, which planting cannot change.
+// Maximum error of the heading of the body after the step, which planting cannot change.
 constexpr double kMaxErrorRad = 0.015;
 constexpr double kMaxLooseErrorRad = 0.5;
-// Steps of walks may turn this much more or less than the library's own steps. With
+// Steps of walks may turn this much more or less than the library's own steps. If the limit were
 // kMaxExtraTurnRad, libraries without steps that turn on the spot would need ten steps for a
 // half-turn.
 constexpr double kMaxWalkTurnRad = 0.6;
 // These limits apply when looking ahead. The next step itself may exceed them a little, because
 // feet do not land exactly as predicted.
 constexpr double kSlack = 1.05;
-// A step that goes no further forward than this ends with the body above both feet.
+// After a step that is not longer than this, the body is above both feet.
 constexpr double kForwardM = 0.2;
 
-// Steps that go less far forward than this, or turn by more, are played fast, unless their foot
-// climbs or descends by more than kUnhurriedClimbM: people do not take stairs faster because their
-// treads are short.
+// Steps that are shorter than kStrideM or turn by more than kHurriedTurnRad are played fast. Steps
+// that climb or descend by more than kUnhurriedClimbM are not, because people do not take stairs
+// faster if their treads are short.
 constexpr double kStrideM = 0.35;
 constexpr double kHurriedTurnRad = 0.25;
 constexpr double kUnhurriedClimbM = 0.08;
@@ -53,61 +53,62 @@ constexpr double kUnhurriedClimbM = 0.08;
 constexpr double kLeastCarried = 0.999;
 constexpr double kDeepestGapM = 0.04;
 constexpr double kHighestRiseM = 0.04;
-// On treads that are too short for a foot, these parts of the sole behind and in front of the ball
-// must rest on the tread. The rest may overhang its edges.
+// On treads that are too short for a foot, these fractions of the sole behind and in front of the
+// ball must rest on the tread. The rest may overhang its edges.
 constexpr double kBearingHeel = 0.6;
 constexpr double kBearingToes = 0.3;
-// The edges of a tread are where the ground rises or drops by more than kEdgeM within kEdgeStepM.
+// A tread ends where the ground rises or drops by more than kEdgeM within kEdgeStepM.
 constexpr double kEdgeM = 0.04;
 constexpr double kEdgeStepM = 0.02;
-// An obstacle along a swing may be at most this much higher than both ends of the swing.
+// Maximum height of an obstacle along a swing, above both ends of the swing.
 constexpr double kMaxHurdleM = 0.25;
 constexpr double kHurdleRadiusM = 0.06;
 
-// To compare steps, efforts and costs are added, in metres (WalkSteering::EffortM). Weight of the
-// effort that remains after the first step. It is added to the effort that remains after both
-// steps. Without it, the walk could postpone its progress for ever.
+// Steps are compared by the sum of efforts (WalkSteering::EffortM) and costs, in metres. This is
+// the weight of the effort that remains after the first step. It is added to the effort that
+// remains after both steps. Without it, the walk could postpone its progress for ever.
 constexpr double kFirstWeight = 0.2;
-// Cost of a metre that the body moves, so that the walk turns in place rather than in a wide curve.
+// Cost per metre that the body moves. It makes the walk turn in place rather than in a wide curve.
 constexpr double kPathWeight = 0.15;
 // Cost of a step without progress.
 constexpr double kIdleStepM = 0.1;
 // Cost of a step after which the other foot cannot continue.
 constexpr double kDeadEndM = 1.0;
-// Cost of arriving with another heading, per radian. It is more than the effort of a turn, so that
-// the walk continues if the library can turn further.
+// Cost of arriving with another heading, per radian. It exceeds the effort of a turn, so that the
+// walk continues if the library can turn further.
 constexpr double kMissWeight = 0.6;
-// Expected duration of a step, to look ahead.
+// Expected duration of a step, for looking ahead.
 constexpr double kExpectedStepS = 0.6;
 
 // Radii of the rings of eight alternative footprints around the desired one, closest first.
 constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
 
 // Steps that would climb or descend by more than kEasyClimbM are shortened to fractions of their
-// length, if that leads onto ground that is at least kLeastClimbM higher or lower than the standing
-// foot. People do not skip treads of stairs either.
+// length. This applies if the shorter step still leads onto ground that is at least kLeastClimbM
+// higher or lower than the standing foot. People do not skip treads of stairs either.
 constexpr double kEasyClimbM = 0.18;
-// Replaces kEasyClimbM on slopes, where the y of the ground's normal is at most kSlopeNormalY.
+// Replaces kEasyClimbM on slopes, where the y component of the ground normal is at most
+// kSlopeNormalY.
 constexpr double kEasySlopeClimbM = 0.15;
 constexpr float kSlopeNormalY = 0.985f;
 constexpr double kLeastClimbM = 0.05;
-// If that is not possible, steps longer than kLongClimbM end before the edge instead.
+// If this is not possible, steps longer than kLongClimbM end before the edge instead.
 constexpr double kLongClimbM = 0.55;
 constexpr std::array<double, 6> kShorterSteps{0.9, 0.8, 0.7, 0.6, 0.5, 0.4};
 
-// Feet keep this distance from risers in front of their toes and behind their heels, if a shift of
-// the footprint makes that possible.
+// Feet keep this distance from risers in front of their toes and behind their heels, if the
+// footprint can be shifted accordingly.
 constexpr double kRoomM = 0.02;
 constexpr std::array<double, 10> kRoomShiftsM{-0.015, 0.015, -0.03, 0.03,   -0.045,
                                               0.045,  -0.06, 0.06,  -0.075, 0.075};
 
-// After this many alternatives that the library cannot reach, the step is given up.
+// After this many alternatives that the library cannot reach, the planner gives the step up.
 constexpr int kMaxOutOfReach = 3;
 
-// Variations of the step towards the goal: shorter steps, and steps towards either side.
+// A variation of the step towards the goal: shorter, or towards either side.
 struct Variation {
   double part;      // Fraction of the full step length.
-  double bend_rad;  // Change of the walking direction, left positive.
+  double bend_rad;  // Change of the walking direction; positive is left.
 };
 constexpr std::array<Variation, 11> kVariations{{{1.0, 0.0},
                                                  {0.75, 0.0},
@@ -126,25 +127,26 @@ constexpr std::array<double, 5> kComfortableTurnsRad{0.0, 0.3, -0.3, 0.6, -0.6};
 // Turns of steps in place.
 constexpr std::array<double, 2> kPivotTurnsRad{0.8, -0.8};
 
-// Within this distance the ground at the goal is checked again, because it may have changed.
+// Within this distance of the goal, the ground there is checked again, because it may have changed.
 constexpr double kGoalInSightM = 1.5;
 
-// A walk makes progress if its remaining effort shrinks by this much.
+// A walk makes progress if its remaining effort decreases by at least this.
 constexpr double kProgressM = 0.02;
 
-// A step that the library has, and where it leads.
+// A step that the library contains, and its result.
 struct PlannedStep {
   RequestPlan plan;
   Foot moved = Foot::kLeft;
   Footprint print;
   double heading_rad = 0.0;  // Heading of the body after the step.
   double error_m = 0.0;      // Distance that planting distributes over the swing.
-  bool is_last = false;      // The step is aimed at the foot's place at the goal.
+  bool is_last = false;      // True if the step leads to the foot's place at the goal.
 };
 
 class StepPlanner {
  public:
-  // To look ahead, `checks_ground` is false: every place is accepted at the height of the ground.
+  // If `checks_ground` is false, every place is accepted, at the height of the ground. This is used
+  // for looking ahead.
   StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance,
               bool checks_ground)
       : library_(library),
@@ -153,8 +155,8 @@ class StepPlanner {
         stance_(stance),
         checks_ground_(checks_ground) {}
 
-  // Plans a step of a foot. Returns nullopt if the library has no such step onto suitable ground. A
-  // strict plan needs little correction by planting.
+  // Plans a step of a foot. Returns nullopt if the library has no such step that ends on suitable
+  // ground. A strict plan requires little correction by planting.
   std::optional<PlannedStep> Plan(Foot moving, const WalkStep& step, bool is_strict) {
     moving_ = moving;
     is_strict_ = is_strict;
@@ -184,8 +186,8 @@ class StepPlanner {
     return std::nullopt;
   }
 
-  // Returns the step with its footprint turned about the standing foot, so that the foot has the
-  // heading that the body gets.
+  // Returns the step with its footprint rotated about the standing foot, so that the foot has the
+  // heading of the body after the step.
   [[nodiscard]] WalkStep TurnedWith(const PlannedStep& planned) const {
     WalkStep step;
     const double turn_rad = planned.heading_rad - planned.print.heading_rad;
@@ -225,7 +227,7 @@ class StepPlanner {
     return print;
   }
 
-  // Returns true if an alternative footprint is still beside the other foot, not across or far
+  // Returns true if an alternative footprint is still beside the other foot, not across it or far
   // behind it.
   bool KeepsApart(const Footprint& print) const {
     const DVec3 v = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);
@@ -241,8 +243,8 @@ class StepPlanner {
     return Carries(SupportOf(*terrain_, library_.leg_rig().side(foot), print));
   }
 
-  // Returns the carried fraction of a sole that may overhang the tread below it, or 0 if the tread
-  // does not carry enough of it.
+  // Returns the carried fraction of a sole that may overhang the tread below it. Returns 0 if the
+  // tread does not carry enough of the sole.
   [[nodiscard]] double CarriedByTread(const Footprint& print) const {
     const LegRig::Side& side = library_.leg_rig().side(moving_);
     const FootSupport whole = SupportOf(*terrain_, side, print);
@@ -255,8 +257,8 @@ class StepPlanner {
     return Carries(support) ? whole.carried : 0.0;
   }
 
-  // Returns true if a footprint is on a tread that is too short for the foot and the room that it
-  // needs in front of its toes and behind its heel.
+  // Returns true if a footprint is on a tread that is too short for the foot and the room that the
+  // foot needs in front of its toes and behind its heel.
   [[nodiscard]] bool IsOnShortTread(const Footprint& print) const {
     const Sole sole = SoleOf(library_.leg_rig().side(moving_));
     const double length_m = sole.heel_m + sole.toe_m + 2.0 * kRoomM;
@@ -282,7 +284,7 @@ class StepPlanner {
   }
 
   // Returns true if the ground does not rise abruptly right in front of the toes or behind the
-  // heel. The slope of the ground up to there is not an abrupt rise.
+  // heel. The slope of the ground up to there does not count as an abrupt rise.
   bool HasRoom(const Footprint& print) const {
     const LegRig::Side& side = library_.leg_rig().side(moving_);
     const auto at = [&](double forward_m) {
@@ -299,8 +301,8 @@ class StepPlanner {
   }
 
   // Returns the footprint, moved forward or backward if its toes or heel would touch a riser and
-  // the tread leaves them room. On a tread that is too short for the foot, moves the footprint to
-  // where the tread carries most of it.
+  // the tread has room for that. On a tread that is too short for the foot, moves the footprint to
+  // where the tread carries most of the sole.
   Footprint WithRoom(const Footprint& print) const {
     const bool is_on_short_tread = IsOnShortTread(print);
     if (!is_on_short_tread && HasRoom(print)) return print;
@@ -327,8 +329,8 @@ class StepPlanner {
     return support.normal.y < kSlopeNormalY;
   }
 
-  // Returns the footprint, moved back toward the standing foot if the step would climb or descend
-  // too much, or if it would be long as well.
+  // Returns the footprint. If the step would climb or descend too much, or if it would climb and
+  // also be long, moves the footprint back towards the standing foot.
   Footprint WithEasyClimb(const Footprint& print) const {
     const auto climb_m = [&](const Footprint& at) {
       return terrain_->HeightAt(at.position_m.x, at.position_m.z) - fixed_m_.y;
@@ -396,7 +398,7 @@ class StepPlanner {
     const double natural_rad = NaturalTurn(group, plan->applied);
     const double turn_rad =
         std::clamp(wanted_rad, natural_rad - kMaxWalkTurnRad, natural_rad + kMaxWalkTurnRad);
-    // If the library has climbing steps, a level step must not land at another height.
+    // If the library has climbing steps, a level step must not end at another height.
     const double error_y = applied_or(ParameterName::kEndY, 0.0) - GroundRise(wanted.y);
     if (is_strict_ && profile_.has_climbs && std::fabs(error_y) > kMaxErrorHeightM) {
       return std::nullopt;
@@ -408,7 +410,7 @@ class StepPlanner {
       return std::nullopt;
     }
     plan->max_extra_turn_rad = kMaxWalkTurnRad;
-    // Short and turning steps are the slowest steps of most libraries, but people take them
+    // In most libraries, short and turning steps are the slowest, but people take such steps
     // quickly.
     const double climb_m =
         print.position_m.y - stance_.feet[static_cast<std::size_t>(moving_)].position_m.y;
@@ -472,8 +474,8 @@ class StepComparison {
     best_m_ = score_m;
     best_ = planned;
   }
-  // Returns true if the walk makes progress with this step, or with it and the next one. A foot may
-  // take its place at the goal only if the other foot can follow.
+  // Returns true if the walk makes progress with this step, or with this step and the next one. A
+  // foot may take its place at the goal only if the other foot can follow.
   [[nodiscard]] bool LeadsOn(const WalkStance& stance, const PlannedStep& step) const {
     const LocomotionProfile& profile = library_.locomotion_profile();
     const WalkStance after = After(stance, step);
@@ -493,7 +495,7 @@ class StepComparison {
   [[nodiscard]] const std::optional<PlannedStep>& best() const { return best_; }
 
  private:
-  // Plans a step. If the body turns less or more than wanted, the footprint turns with it.
+  // Plans a step. If the body turns by another angle than requested, the footprint turns with it.
   static std::optional<PlannedStep> PlanTurned(StepPlanner& planner, Foot moving,
                                                const WalkStep& step) {
     if (planner.is_exhausted()) return std::nullopt;
@@ -542,12 +544,12 @@ class StepComparison {
   const Terrain* terrain_;
   const WalkRequest& walk_;
   std::size_t next_waypoint_;
-  double effort_m_;  // Before the step.
+  double effort_m_;  // Effort before the step.
   std::optional<PlannedStep> best_;
   double best_m_ = HUGE_VAL;
 };
 
-// Returns a step in place that turns the body closer to the heading of the goal. Returns nullopt if
+// Returns a step in place that turns the body towards the heading at the goal. Returns nullopt if
 // the library has none.
 std::optional<PlannedStep> TurnAtGoal(StepPlanner& planner, const WalkStance& stance,
                                       const WalkRequest& walk, const WalkSteering& steering) {
@@ -563,8 +565,8 @@ std::optional<PlannedStep> TurnAtGoal(StepPlanner& planner, const WalkStance& st
   return std::nullopt;
 }
 
-// Returns the step that steering wants if the library has it. Otherwise, compares variations of it,
-// comfortable steps and steps in place.
+// Returns the step that the steering proposes, if the library has it. Otherwise, compares
+// variations of that step, comfortable steps and steps in place.
 std::optional<PlannedStep> ChooseStep(StepPlanner& planner, StepComparison& comparison,
                                       const WalkStance& stance, WalkSteering& steering,
                                       std::size_t next_waypoint) {

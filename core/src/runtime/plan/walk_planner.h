@@ -18,9 +18,10 @@ struct WalkStance {
   double heading_rad = 0.0;       ///< Heading of the body, unwrapped.
   Foot last_moved = Foot::kRight;
   FootState vector;          ///< Relative position of the feet, for PlanStep.
-  double last_step_s = 0.0;  ///< Duration of the previous step; 0 if the avatar does not walk.
-  bool is_exact = true;  ///< Feet land exactly on their footprints; false without foot planting.
-  /// [foot]: the last step of this foot in the current walk was aimed at its place at the goal.
+  double last_step_s = 0.0;  ///< Duration of the previous step. 0 if the avatar is not walking.
+  /// True if feet land exactly on their footprints. False without foot planting.
+  bool is_exact = true;
+  /// [foot]: true if the last step of this foot in the current walk led to its place at the goal.
   std::array<bool, 2> is_aimed{};
 };
 
@@ -29,22 +30,22 @@ struct WalkProgress {
   std::size_t next_waypoint = 0;
   int steps = 0;
   int steps_without = 0;  ///< Number of steps since the walk last made progress.
-  /// Least remaining effort so far (WalkSteering::EffortM).
+  /// Minimum of the remaining effort so far (WalkSteering::EffortM).
   double least_effort_m = std::numeric_limits<double>::infinity();
   /// True if a step of this walk was changed because the ground at its footprint does not support a
   /// foot.
   bool is_detour = false;
-  /// [foot]: the last step of this foot was aimed at its place at the goal.
+  /// [foot]: true if the last step of this foot led to its place at the goal.
   std::array<bool, 2> is_aimed{};
 };
 
-/// Measures how fast a walk is. A new walk starts with a default value.
+/// Measures the speed of a walk. A new walk starts with a default value.
 class WalkPace {
  public:
-  /// Must be called where a step of the walk begins or ends, with the base frame and the time.
+  /// Call it where a step of the walk begins or ends, with the base frame and the time.
   void Add(const DVec3& position_m, double time_s);
-  /// Returns the mean speed without the first kStartSteps and the last kStopSteps steps. 0 if no
-  /// other steps are left.
+  /// Returns the mean speed without the first kStartSteps and the last kStopSteps steps. Returns 0
+  /// if no other steps are left.
   [[nodiscard]] double mean_m_s() const;
 
  private:
@@ -55,7 +56,7 @@ class WalkPace {
     double path_m = 0.0;  // Length of the walk so far.
     double time_s = 0.0;
   };
-  std::array<Mark, kStopSteps + 1> last_;  // The latest marks, the oldest first.
+  std::array<Mark, kStopSteps + 1> last_;  // The latest marks, oldest first.
   Mark started_;                           // The mark after the first kStartSteps steps.
   DVec3 position_m_ = DVec3(0.0);
   std::size_t marks_ = 0;
@@ -65,30 +66,32 @@ enum class WalkOutcome : std::uint8_t { kStep, kArrived, kRefused };
 
 struct WalkDecision {
   WalkOutcome outcome = WalkOutcome::kArrived;
-  RequestPlan plan;  ///< The planned step; set for kStep.
-  /// Set for kRefused: the reason, as one sentence in static storage.
+  RequestPlan plan;  ///< The planned step. Set for kStep.
+  /// Reason of a refusal, as one sentence in static storage. Set for kRefused.
   const char* reason = "";
 };
 
-/// Limits of a walk. It ends after kMaxStepsWithout steps without progress, or after
-/// kMaxDetourSteps if it makes a detour around ground that does not support a foot.
+/// Limits of a walk. It ends after kMaxStepsWithout steps without progress. If it makes a detour
+/// around ground that does not support a foot, it ends after kMaxDetourSteps such steps.
 inline constexpr int kMaxWalkSteps = 10'000;
 inline constexpr int kMaxStepsWithout = 2;
 inline constexpr int kMaxDetourSteps = 16;
-/// Footprints must be on ground whose normal has at least this y component (cosine of 20 degrees).
+/// Minimum y component of the ground normal at a footprint (cosine of 20 degrees).
 inline constexpr double kLeastWalkNormalY = 0.9396926;
-/// Footprints may be at most this far above or below the standing foot.
+/// Maximum height difference between a footprint and the standing foot.
 inline constexpr double kMaxWalkClimbM = 0.26;
-/// Largest number of footprints whose ground is checked per step.
+/// Maximum number of footprints whose ground is checked per step.
 inline constexpr int kMaxWalkCandidates = 256;
 
-/// Plans the next step of a walk: towards the goal, with steps that the library has, onto ground
-/// that supports a foot. The remaining distance is divided into equal steps. If the library does
-/// not have the next of them, the planner compares shorter, longer and turning steps of either foot
-/// by the effort that remains after them. Every decision is made for one step only, so a changed
-/// terrain or goal takes effect with the next step. Never allocates. The time is bounded by
-/// kMaxWalkCandidates ground checks and, on level ground, 160 calls of PlanFootprint. Most steps of
-/// libraries with starts, stops and turns need one call.
+/// Plans the next step of a walk towards the goal. Uses only steps that the library contains and
+/// ground that supports a foot. The remaining distance is divided into equal steps. If the library
+/// lacks the next of them, the planner compares shorter, longer and turning steps of either foot by
+/// the effort that remains after them.
+///
+/// Every decision applies to one step only, so a changed terrain or goal takes effect with the next
+/// step. Never allocates. The time is bounded by kMaxWalkCandidates ground checks and, on level
+/// ground, 160 calls of PlanFootprint. Most steps of libraries with starts, stops and turns need
+/// one call.
 [[nodiscard]] WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                                         const WalkRequest& walk, const WalkStance& stance,
                                         WalkProgress& progress);

@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-// Largest turn of a foot per step, away from the other foot (out) and towards it (in).
+// Maximum turn of a foot per step, away from the other foot (out) and towards it (in).
 struct TurnLimits {
   double out_rad;
   double in_rad;
@@ -17,58 +17,60 @@ struct TurnLimits {
 constexpr TurnLimits kWalkTurn{0.7, 0.5};
 constexpr TurnLimits kSpotTurn{1.0, 0.7};
 
-// A waypoint counts as passed within this distance.
+// A waypoint is passed when the body is within this distance of it.
 constexpr double kPassWaypointM = 0.35;
-// Feet this close to their standing positions relative to each other are together.
+// If the feet deviate from their relative position in a stand by at most this, they are together.
 constexpr double kTogetherM = 0.05;
 constexpr double kTogetherRad = 0.15;
-// A foot this close to its footprint at the goal is at the goal.
+// A foot within this distance of its footprint at the goal is at the goal.
 constexpr double kAtGoalM = 1e-3;
 constexpr double kAtGoalRad = 2e-3;
-// The same tolerances after a step that was aimed at the goal. The library's steps may not turn
-// their feet or the body far enough.
+// The same tolerances after a step that led to the goal. They are larger, because the library's
+// steps may not turn the feet or the body far enough.
 constexpr double kAimedM = 0.02;
 constexpr double kAimedRad = 0.5;
 constexpr double kAimedBodyRad = 0.25;
 
 // Effort of turning by one radian, in metres. Within kNearM of the goal the direction of the path
-// counts less, because the last steps lead in any direction.
+// has a smaller weight, because the last steps may lead in any direction.
 constexpr double kTurnEffort = 0.3;
 constexpr double kNearM = 0.5;
-// Effort of a metre sideways or backward.
+// Effort of moving one metre sideways or backward, in metres.
 constexpr double kSideEffort = 1.5;
 
-// An avatar turns and walks forward to goals further away than kMaxShiftM. It may reach nearer
-// goals with steps sideways or backward. For libraries whose longest step backward is shorter than
-// kBackM the limit is kMaxShiftWithoutBackM, because they have to combine other steps.
+// If the goal is further away than kMaxShiftM, an avatar turns and walks forward. It may reach
+// closer goals with steps sideways or backward. For libraries whose longest step backward is
+// shorter than kBackM, the limit is kMaxShiftWithoutBackM, because they have to combine other
+// steps.
 constexpr double kMaxShiftM = 2.0;
 constexpr double kMaxShiftWithoutBackM = 1.3;
 constexpr double kBackM = 0.2;
-// Goals closer than this are reached without turning towards them first.
+// The avatar does not turn towards a goal that is closer than this.
 constexpr double kShuffleM = 0.15;
 constexpr double kSideStepM = 0.32;
-// A distance sideways is divided into steps of about this length.
+// A sideways distance is divided into steps of about this length.
 constexpr double kLongSideStepM = 0.345;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
-// Expected duration of a stride, to compare ways of reaching a goal. Steps that turn on the spot or
-// go sideways or backward are played fast (RequestPlan::max_rate) and take kQuickStepS.
+// Expected duration of a stride, for comparing paths to a goal. Steps that turn on the spot or lead
+// sideways or backward are played fast (RequestPlan::max_rate) and take kQuickStepS.
 constexpr double kStrideS = 0.62;
-// A library that only has strides, or no steps backward, steps sideways if that saves more than
-// this time.
+// If a library has only strides, or no steps backward, the avatar steps sideways only if that saves
+// more than this time.
 constexpr double kStrideMarginS = 0.3;
 
-// An avatar that faces away from its path by more than this turns on the spot first.
+// If the angle between an avatar's heading and its path exceeds this, it first turns on the spot.
 constexpr double kSlowTurnRad = 0.7;
-// The walk approaches the goal in a curve that ends in the goal's heading. The curve is this
-// fraction of the remaining distance long, at most kCurveM. It fades out for headings that would
-// need a loop, from kMaxCurveRad - kCurveFadeRad to kMaxCurveRad.
+// The walk approaches the goal in a curve that ends in the heading at the goal. The length of the
+// curve is this fraction of the remaining distance, at most kCurveM. The curve fades out for
+// headings that would require a loop, between kMaxCurveRad - kCurveFadeRad and kMaxCurveRad.
 constexpr double kCurvePart = 0.2;
 constexpr double kCurveM = 0.6;
 constexpr double kMaxCurveRad = 1.9;
 constexpr double kCurveFadeRad = 0.6;
 
-// A distance is not divided further if its steps are at most this fraction longer than comfortable.
+// A distance is divided into fewer steps if these are at most this fraction longer than comfortable
+// ones.
 constexpr double kStretch = 0.15;
 constexpr double kFirstStepS = 0.6;
 constexpr double kShortestStepM = 0.2;
@@ -77,7 +79,7 @@ double Length(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 double HeadingTo(const DVec3& v) { return Atan2(v.x, v.z); }
 double Outward(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
 
-// Returns the number of equal parts into which a length is divided, so that no part is much longer
+// Returns the number of equal parts into which to divide a length, so that no part is much longer
 // than `one`.
 double PartCount(double length, double one) {
   return std::max(1.0, std::ceil(length / one - kStretch));
@@ -104,7 +106,7 @@ WalkSteering::WalkSteering(const LocomotionProfile& profile, const WalkRequest& 
   }
 }
 
-// Returns the position of a foot relative to the body, with the feet side by side.
+// Returns the position of a foot relative to the body while the feet are side by side.
 DVec3 WalkSteering::FootOffset(Foot foot, double width_m) const {
   const DVec3 left = profile_.stand_feet_m[0];
   const DVec3 right = profile_.stand_feet_m[1];
@@ -259,9 +261,9 @@ bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   const double walking_s = turning_s(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
                            kStrideS * PartCount(remaining_m, StepM()) + kQuickStepS +
                            turning_s(WrapAngle(approach_.heading_rad - way_rad), kSpotTurn.out_rad);
-  // The body turns to its final heading while it steps, so the path is measured from the heading
-  // midway between the current and the final one. Measured from the current heading, the preferred
-  // kind of step would change from step to step, and walks would zigzag.
+  // The body turns to its final heading while it steps. The path is therefore measured from the
+  // heading midway between the current and the final one. If it were measured from the current
+  // heading, the preferred kind of step would change from step to step, and walks would zigzag.
   const double turn_rad = WrapAngle(approach_.heading_rad - body.heading_rad);
   const DVec3 local = RotateYaw(-body.heading_rad - 0.5 * turn_rad, way);
   const double along_s =
@@ -270,12 +272,12 @@ bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   const double shifting_s = std::max(
       {kQuickStepS + along_s, kQuickStepS * 2.0 * PartCount(std::fabs(local.x), kLongSideStepM),
        kQuickStepS + turning_s(turn_rad, 0.0)});
-  // Libraries without short steps or steps backward often have no side steps either.
+  // Libraries without short steps or steps backward often lack side steps as well.
   const bool may_lack_steps = profile_.shortest_m > kShortestStepM || profile_.back_m < kBackM;
   return shifting_s <= walking_s - (may_lack_steps ? kStrideMarginS : 0.0);
 }
 
-// If the avatar does not walk and its feet are apart along the way, prefers the foot behind and
+// If the avatar is not walking and its feet are apart along the path, prefers the foot behind and
 // returns true.
 bool WalkSteering::PreferFootBehind(const Body& body, std::size_t next_waypoint) {
   if (stance_.last_step_s > 0.0) return false;
@@ -313,7 +315,7 @@ std::span<const Foot> WalkSteering::FeetToMove(std::size_t next_waypoint) {
           kTogetherRad;
   if (!is_together) return std::span(feet_).first(1);
 
-  // From a stand, either foot may step first. Prefer the foot on the side of the turn or the path.
+  // From a stand, either foot may step first. Prefers the foot on the side of the turn or the path.
   Foot first = expected;
   const auto towards = [&](double value, double least) {
     if (std::fabs(value) > least) first = value > 0.0 ? Foot::kLeft : Foot::kRight;
@@ -374,7 +376,7 @@ WalkStep WalkSteering::StepTowardsGoal(Foot moving, double part) const {
 WalkStep WalkSteering::StepTo(const Body& body, Foot moving) const {
   const DVec3 fixed = At(OtherFoot(moving)).position_m;
   const DVec3 local = RotateYaw(-body.heading_rad, body.position_m - fixed);
-  // Long steps place the feet closer together than standing does.
+  // In long steps, the feet are closer together sideways than in a stand.
   const double stride = std::clamp(std::fabs(local.z) / 0.35, 0.0, 1.0);
   const double width_m = profile_.stand_m + (profile_.width_m - profile_.stand_m) * stride;
   DVec3 vector = local + FootOffset(moving, width_m);
@@ -390,8 +392,8 @@ WalkStep WalkSteering::StepTo(const Body& body, Foot moving) const {
   return step;
 }
 
-// Returns the number of equal steps for a distance. If the library stands in a stride, the rear
-// foot must take the last of them, which decides whether the number is odd or even.
+// Returns the number of equal steps for a distance. If the stand pose of the library is a stride,
+// the rear foot must take the last step, which decides whether the number is odd or even.
 double WalkSteering::StepCount(Foot moving, double distance_m, bool is_last_leg) const {
   const double steps = PartCount(distance_m, StepM());
   if (!profile_.stands_in_stride || !is_last_leg) return steps;
@@ -435,7 +437,8 @@ WalkStep WalkSteering::SideStep(const Body& body, Foot moving, double part, doub
   const double turn_out_rad = outward * turn_rad;
   const double inner_m = std::max(0.02, profile_.stand_m - kLeastApartM);
 
-  // Sideways movement and turning take pairs of steps: the outer foot moves, the other follows.
+  // Sideways motion and turning take pairs of steps: the outer foot moves first, and the other foot
+  // follows.
   const double side_pairs = std::fabs(local.x) <= inner_m && aside_m < 0.0
                                 ? 0.0
                                 : PartCount(std::fabs(local.x), kLongSideStepM);

@@ -11,19 +11,20 @@ namespace stridewire {
 
 /// A step that WalkSteering proposes.
 struct WalkStep {
-  Footprint print;  ///< Target without a height. Its heading is that of the body afterwards.
+  Footprint print;  ///< Target without a height. Its heading is that of the body after the step.
   DVec3 root_m = DVec3(0.0);  ///< Position of the body after the step if the avatar stops there.
   /// True if the footprint is at the goal, so that no alternative is acceptable.
   bool is_last = false;
 };
 
-/// Computes where the next steps of a walk should lead. It assumes level ground and feet that reach
-/// every place within a box. The planner then checks which of these steps the library and the
-/// ground allow.
+/// Computes where the next steps of a walk should lead. It assumes level ground and feet that can
+/// reach every place within a box. The planner then checks which of these steps the library and the
+/// ground permit.
 ///
-/// The position of the body is derived from the foot that stays, as if the other foot stood beside
-/// it. Each step moves the body by an equal part of the remaining distance. If the library stands
-/// in a stride (LocomotionProfile::stands_in_stride), the feet end in the same stride at the goal.
+/// The position of the body is derived from the staying foot, as if the other foot stood beside it.
+/// Each step moves the body by an equal part of the remaining distance. If the stand pose of the
+/// library is a stride (LocomotionProfile::stands_in_stride), the feet end in the same stride at
+/// the goal.
 class WalkSteering {
  public:
   WalkSteering(const LocomotionProfile& profile, const WalkRequest& walk, const WalkStance& stance);
@@ -33,27 +34,27 @@ class WalkSteering {
 
   /// Returns true if the body and both feet are at the goal within the tolerances.
   [[nodiscard]] bool HasArrived(double within_m, double within_rad) const;
-  /// Returns true if both feet are at the goal, or close to it after a step that was aimed at it
+  /// Returns true if both feet are at the goal, or close to it after a step that led to it
   /// (WalkStance::is_aimed): within 0.02 m and 0.5 rad, with the body within 0.25 rad.
   [[nodiscard]] bool IsCloseToGoal() const;
-  /// Returns the remaining effort in metres, as if the other foot stood beside `moved`: the
+  /// Returns the remaining effort in metres, as if the other foot stood beside `moved`. It is the
   /// distance through the waypoints plus the turns, where a radian counts as 0.3 m. Close to the
   /// goal, it is at most the effort of stepping sideways.
   [[nodiscard]] double EffortM(Foot moved, std::size_t next_waypoint) const;
   /// Returns the distance between the positions of the body that are derived from the left and from
-  /// the right foot. After a step, this is how far the body moves in that step.
+  /// the right foot. After a step, this is the distance by which the body moves in that step.
   [[nodiscard]] double BodiesApartM() const;
 
-  /// Returns the feet that may step next, the preferred foot first. During a walk the feet
-  /// alternate. Otherwise, if the feet are apart along the way, the foot behind is preferred.
+  /// Returns the feet that may step next, the preferred foot first. During a walk, the feet
+  /// alternate. Otherwise, if the feet are apart along the path, the foot behind is preferred.
   [[nodiscard]] std::span<const Foot> FeetToMove(std::size_t next_waypoint);
 
-  /// Returns the next step of a foot, scaled by `part`, in a direction turned to the left by
-  /// `bend_rad`.
+  /// Returns the next step of a foot. `part` scales its length, and `bend_rad` turns its direction
+  /// to the left.
   [[nodiscard]] WalkStep NextStep(Foot moving, std::size_t next_waypoint, double part,
                                   double bend_rad) const;
 
-  /// Returns a step forward of comfortable length that turns by `turn_rad`, wherever the goal is.
+  /// Returns a step forward of comfortable length that turns by `turn_rad`, regardless of the goal.
   [[nodiscard]] WalkStep ComfortableStep(Foot moving, double turn_rad) const;
 
   /// Returns a step in place that turns by `turn_rad`.
@@ -97,8 +98,9 @@ class WalkSteering {
   const WalkRequest& walk_;
   const WalkStance& stance_;
   Body goal_;
-  // Target of the body before the last step. It differs from goal_ if the library stands in a
-  // stride: the rear foot is then on its footprint, and the last step moves the front foot ahead.
+  // Target of the body before the last step. If the stand pose of the library is a stride, it
+  // differs from goal_: the rear foot is then on its footprint, and the last step moves the front
+  // foot ahead.
   Body approach_;
   std::array<Foot, 2> feet_{};
 };
