@@ -41,7 +41,7 @@ struct AvatarCrowd::Scratch {
   std::shared_ptr<const MotionLibrary> library;
   SoaPoseEvaluator evaluator;
   PlanScratch plan;
-  // Simulations of the avatars that are passed to Advance.
+  // Simulations of the avatars that were passed to Advance.
   std::vector<AvatarSimulation*> simulations;
 };
 

@@ -47,7 +47,7 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
   }
   Evaluate(time_s);
   earlier_feet[0] = corrections(time_s, blended_pose);
-  // If planting has not faded in completely, the next movement fades it in again from the start.
+  // If planting has not completely faded in, the next movement starts the fade-in again.
   begins_planting =
       movement.feet.is_active && time_s < movement.start_offset_s + movement.feet.plant_fade_s;
   if (begins_planting) UseDisplayedAsBlended(time_s, keeps_speed);
@@ -124,7 +124,8 @@ void AvatarBody::BlendIn(const LandingDecision& decision, bool keeps_speed,
   BlendInAt(decision, keeps_speed, scratch);
 }
 
-// Makes the foot corrections of the planned movement continue smoothly from the previous ones.
+// Makes the foot corrections of the planned movement continue smoothly from the previous
+// corrections.
 void AvatarBody::ContinueFeet(bool keeps_speed, const std::array<FeetAt, 2>& blended) {
   const double start_offset_s = movement.start_offset_s;
   std::array<FeetCorrection, 2> planned{CorrectFeet(movement, start_offset_s, blended[0])};

@@ -12,9 +12,9 @@
 
 namespace stridewire {
 
-/// The displayed state of an avatar and everything its next movement depends on. AvatarSimulation,
-/// which decides how an avatar moves, and AvatarReplica, which receives these decisions, share this
-/// part. Times are relative to the start of the movement.
+/// The displayed state of an avatar, and everything that its next movement depends on.
+/// AvatarSimulation decides how an avatar moves, and AvatarReplica receives these decisions. Both
+/// contain an AvatarBody. Times are relative to the start of the movement.
 struct AvatarBody {
   explicit AvatarBody(std::shared_ptr<const MotionLibrary> of_library);
 
@@ -23,11 +23,12 @@ struct AvatarBody {
   LayerStack layers;
   Pose layered_pose;  ///< Pose with layers; empty until the first layer is set.
   bool has_layers = false;
-  bool plants_feet = false;  ///< True if the displayed feet are planted, or would be while moving.
+  /// True if the displayed feet are planted or, while standing still, would be planted in motion.
+  bool plants_feet = false;
   bool begins_planting = false;  ///< True if the next movement is the first one with planted feet.
-  Pose blended_pose;  ///< Pose without planting at the time the movement ended or was interrupted.
+  Pose blended_pose;  ///< Pose without planting when the movement ended or was interrupted.
   /// Source of the next blend: foot corrections at the end of the previous movement and, if its
-  /// velocity is kept, kBlendStepS before that. `earlier_pose` is the blended pose at that earlier
+  /// velocity is kept, kBlendStepS before that. `earlier_pose` is the blended pose at the earlier
   /// time.
   std::array<FeetCorrection, 2> earlier_feet;
   Pose earlier_pose;
@@ -40,26 +41,26 @@ struct AvatarBody {
   /// Evaluates `pose` and `blended_pose` at a time of the movement.
   void Evaluate(double time_s);
 
-  /// Stores what the next movement, which begins at `time_s` of this one, blends from. Also
-  /// evaluates `blended_pose` at `time_s`.
+  /// Stores the data from which the next movement blends, which begins at `time_s` of this one.
+  /// Also evaluates `blended_pose` at `time_s`.
   void CaptureBlendSource(double time_s, bool keeps_speed);
 
   /// Uses the displayed pose at `time_s` as the blended pose. Everything that the next movement
-  /// does not continue fades out with the difference pose, and feet need no correction.
+  /// does not continue then fades out with the difference pose, and feet need no correction.
   void UseDisplayedAsBlended(double time_s, bool keeps_speed);
 
-  /// Stores where the planted feet stand if the movement ends at `time_s`. Call CaptureBlendSource
-  /// first.
+  /// Stores the positions of planted feet for a movement that ends at `time_s`. Call
+  /// CaptureBlendSource first.
   void CaptureFootLocks(double time_s);
 
-  /// Starts the movement, whose weights are set, at `base` with the playback speed `rate`.
+  /// Starts the movement at `base` with the playback speed `rate`. Its weights must be set.
   void StartWeighted(const BaseFrame& base, double rate);
 
   /// Makes the movement that was just started begin at `time_s` instead of 0.
   void SetStartOffset(double time_s);
 
-  /// Plans the feet of the movement that was just started, if they are planted, and the difference
-  /// pose that fades out.
+  /// Completes the movement that was just started: plans its feet if they are planted, and computes
+  /// the difference pose that fades out.
   void BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch);
   void BlendIn(const LandingDecision& decision, bool keeps_speed, FootPlanScratch& scratch);
 

@@ -1,4 +1,5 @@
-// AvatarSimulation: rejects steps and jumps that are out of reach, and plans exact placement.
+// AvatarSimulation: rejects steps and jumps that are out of reach, and plans steps with exact
+// placement.
 
 #include <algorithm>
 #include <cmath>
@@ -13,19 +14,19 @@
 namespace stridewire {
 namespace {
 
-// A foot within these tolerances is on its footprint. The documented tolerance is 1 mm; planting is
-// accurate to a hundredth of that.
+// Tolerances within which a foot is on its footprint. The documented tolerance is 1 mm. Planting is
+// 100 times as accurate.
 constexpr double kMetM = 0.9e-3;
 constexpr double kMetRad = 1e-3;
 // Number of times between landing and the end of the step at which the pose is checked.
 constexpr int kChecks = 5;
-// On terrain, a sole is lifted out of the ground if its heel or toes are below it. A lift up to
-// this height does not count as an error.
+// On terrain, planting lifts a sole whose heel or toes are below the ground. A lift up to this
+// height does not count as an error.
 constexpr double kLiftedM = 0.1;
 
-// The nearest footprint in reach is found iteratively. A step that aims too far lands short, but a
-// step that aims at that landing place may land elsewhere again, because the library blends a
-// different step. Aiming further by kOvershoot times the error converges faster.
+// The nearest footprint in reach is found iteratively. A step aimed too far lands short of its
+// target. A step aimed at that landing place may land elsewhere again, because the library blends a
+// different step. Convergence is faster if the target is moved by kOvershoot times the error.
 constexpr int kMaxTries = 8;
 constexpr double kOvershoot = 1.5;
 
@@ -39,7 +40,8 @@ StepMeasures MeasuresOf(const RequestTarget& target, double outward) {
   return {target.vector_m.z, outward * target.vector_m.x, target.vector_m.y, target.turn_rad};
 }
 
-// Returns the length of a step, and its other measures that differ from those requested.
+// Describes the length of a step, and those of its other measures that differ from the requested
+// ones.
 std::string MeasuresText(const StepMeasures& step, const FootprintError& missed) {
   constexpr double kVisible = 0.005;
   std::string text;
@@ -81,14 +83,14 @@ std::string DescribeRejection(const AvatarEvent& event) {
   return text;
 }
 
-// Adds the event that rejects a request whose plan is out of reach.
+// Adds the event for a request that is rejected because its plan is out of reach.
 void AvatarSimulation::RejectOutOfReach(const MovementRequest& request, const RequestPlan& plan) {
   const MovementKind kind = body_.library->group(plan.group).kind;
   const auto* step = std::get_if<StepRequest>(&request.movement);
   const RequestError error = PlannedError(plan);
   const Foot foot = IsStep(kind) ? MovingFoot(kind) : Foot::kLeft;
   const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
-  // The path of a step begins at the fixed foot, in the heading after the step.
+  // The path of a step starts at the fixed foot, in the heading after the step.
   const DVec3 from_m = IsStep(kind) ? StandingPosition(OtherFoot(foot)) : base_.position_m;
   const double heading_rad = base_.heading_rad + (IsStep(kind) ? error.reached.turn_rad : 0.0);
   FootprintError missed{.nearest = {from_m + RotateYaw(heading_rad, error.reached.vector_m),
@@ -166,7 +168,7 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   return false;
 }
 
-// Finds the footprint nearest to the missed one that the avatar can reach exactly.
+// Finds the footprint closest to the missed one that the avatar can reach exactly.
 FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
                                                 const FootprintError& missed, double start_phase,
                                                 PlanScratch& scratch) {
@@ -190,10 +192,10 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
           std::fabs(asked.heading_rad - error.nearest.heading_rad)};
 }
 
-// Computes where the planned step brings its foot, and how far that is from the requested
-// footprint. The plan's own error is not enough: a leg that is too short for a step up or down
-// shows only in the planted pose. If the other foot is displaced instead, its displacement counts
-// as the error.
+// Computes where the planned step places its foot, and how far that is from the requested
+// footprint. The error in the plan is not sufficient: only the planted pose shows that a leg is too
+// short for a step up or down. If the other foot is displaced instead, its displacement is the
+// error.
 FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();

@@ -2,9 +2,9 @@
 //
 //   last movement -> settle (0.5 s: blends into the stand pose) -> idle -> idle -> ... -> movement
 //
-// Settle and idle are movements with a group of their own (StandMotion), so evaluation, planting,
-// blends, replicas and caches treat them like steps. The caller sees a stand: they cause
-// no events, and any request ends them at once.
+// Settle and idle are movements with a separate group (StandMotion), so that evaluation, planting,
+// blends, replicas and caches treat them like steps. To the caller, the avatar stands: these
+// movements cause no events, and any request ends them at once.
 
 #include <array>
 #include <cmath>
@@ -18,12 +18,12 @@
 namespace stridewire {
 namespace {
 
-// Returns the place in the idle loop at which an avatar with this seed begins, in seconds.
+// Returns the time in the idle loop at which an avatar with this seed starts, in seconds.
 double LoopStart(std::uint64_t seed) { return kIdleLoopS * FractionOf(Scramble(seed)); }
 
 }  // namespace
 
-// Advances the idle motion of a standing avatar, and begins it if necessary.
+// Advances the idle motion of a standing avatar, and starts it if necessary.
 void AvatarSimulation::AdvanceIdleMotion(double by_s, PlanScratch& scratch) {
   STRIDEWIRE_CHECK(!is_moving_);
   if (is_idling_ && movement_time_s_ + by_s > body_.movement.duration_s()) {
@@ -34,7 +34,7 @@ void AvatarSimulation::AdvanceIdleMotion(double by_s, PlanScratch& scratch) {
   if (is_idling_) movement_time_s_ += by_s;
 }
 
-// Begins to settle or to idle. The motion will be advanced by `left_s` in this tick.
+// Starts to settle or to idle. The motion will be advanced by `left_s` in this tick.
 void AvatarSimulation::BeginIdleMotion(double left_s, PlanScratch& scratch) {
   const MotionLibrary& library = *body_.library;
   if (!options_.idle_motion || !body_.plants_feet || !library.has_stand_motion()) return;
@@ -45,8 +45,8 @@ void AvatarSimulation::BeginIdleMotion(double left_s, PlanScratch& scratch) {
   movement.parameters = {};
   ApplyWeights(group(), std::array{1.0}, movement);
   body_.StartWeighted(base_, 1.0);
-  // The place in the loop depends on the seed and the time only, so that the motion continues if
-  // it is interrupted for a moment.
+  // The position in the loop depends only on the seed and the time, so that the motion continues
+  // after a short interruption.
   const double place_s = std::fmod(LoopStart(options_.seed) + time_s_, kIdleLoopS);
   if (!settles) body_.SetStartOffset(place_s);
   body_.BlendIn(LandingDecision{.is_on_terrain = options_.terrain != nullptr}, keeps_speed(),

@@ -1,4 +1,4 @@
-// AvatarSimulation: changes from one movement to the next, at its end or in the middle of it.
+// AvatarSimulation: changes between movements, at the end of a movement or during it.
 
 #include <algorithm>
 #include <cmath>
@@ -13,17 +13,17 @@ namespace stridewire {
 
 namespace {
 
-// The swinging foot may land this far behind its current position, in metres.
+// Maximum distance by which the swinging foot may land behind its current position, in metres.
 constexpr double kMaxSwingBackM = 0.06;
-// A foot that has to land early lands this far ahead of its current position, in metres.
+// Distance ahead of its current position at which a foot that has to land early lands, in metres.
 constexpr double kEarlyLandingM = 0.12;
 
-// Returns the request of a step that another request needs. Its plan is never out of reach.
+// Returns the request for a step that another request requires. Its plan is never out of reach.
 MovementRequest PlannedStep(std::uint64_t id) {
   return {.id = id, .movement = StepRequest{.allow_nearest = true}};
 }
 
-// Returns the share of its path that a swinging foot has covered, roughly.
+// Returns the approximate fraction of its path that a swinging foot has covered.
 double SwingShare(double phase) {
   const double part = std::clamp(phase - 1.0, 0.0, 1.0);
   return part * part * (3.0 - 2.0 * part);
@@ -31,9 +31,9 @@ double SwingShare(double phase) {
 
 }  // namespace
 
-// Returns the movement time at which both feet are on the ground: the current time if they already
-// are, otherwise the end of the swing. A jump that has begun is always completed, and so is a step
-// that the avatar inserts for the interrupting request.
+// Returns the movement time from which both feet are on the ground: the current time if they
+// already are, and otherwise the end of the swing. A jump that has started is always completed, and
+// so is a step that the avatar inserts for the interrupting request.
 double AvatarSimulation::LandingTime() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   return IsStep(group().kind) && inserted_steps_ == 0 && movement_time_s_ <= swing.release_s
@@ -41,7 +41,7 @@ double AvatarSimulation::LandingTime() const {
              : std::max(movement_time_s_, swing.land_s);
 }
 
-// Returns true if the current step ends in a stride, so that the feet still have to be brought
+// Returns true if the current step ends with the feet apart, so that they must still be brought
 // together.
 bool AvatarSimulation::LandsWithFeetApart() const {
   if (!IsStep(group().kind) || !body_.movement.feet.is_active) return false;
@@ -56,8 +56,8 @@ double AvatarSimulation::MovementEnd() const {
   const double end_s = body_.movement.duration_s();
   if (!interrupts_ || IsStartDelayed()) return end_s;
   if (std::holds_alternative<StandRequest>(queue_[queue_head_].movement)) {
-    // A stand needs a step that brings the feet together. If that is this step, it must be
-    // completed, because no pose before its end is a standing pose.
+    // A stand requires a step that brings the feet together. If the current step does so, it must
+    // be completed, because no pose before its end is a standing pose.
     const bool is_stepping =
         movement_time_s_ > SwingTimesOf(group().kind, body_.movement).release_s;
     if (is_stepping ? !LandsWithFeetApart() : !is_walking_) return end_s;
@@ -65,8 +65,8 @@ double AvatarSimulation::MovementEnd() const {
   return std::min(LandingTime(), end_s);
 }
 
-// Returns how far the current step has come: 0 at its start, 1 when the foot leaves the ground, 2
-// when it lands.
+// Returns the phase of the current step: 0 at its start, 1 when the foot leaves the ground, 2 when
+// it lands.
 double AvatarSimulation::StepPhase() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   return movement_time_s_ <= swing.release_s
@@ -74,7 +74,7 @@ double AvatarSimulation::StepPhase() const {
              : 1.0 + (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
 }
 
-// Returns true if the swinging foot can land on a footprint without swinging back.
+// Returns true if the swinging foot can land on a footprint without moving back.
 bool AvatarSimulation::IsAheadOfSwing(const Footprint& print, double phase) const {
   const FootTrajectory& swing = body_.movement.feet.foot(MovingFoot(group().kind));
   const DVec3 path = swing.to.position_m - swing.from.position_m;
@@ -84,8 +84,8 @@ bool AvatarSimulation::IsAheadOfSwing(const Footprint& print, double phase) cons
   return rest.x * path.x + rest.z * path.z >= -kMaxSwingBackM * length_m;
 }
 
-// Plans a step that puts the swinging foot down shortly ahead of where it is. Returns nullopt if
-// that is hardly shorter than the current step.
+// Plans a step in which the swinging foot lands shortly ahead of its current position. Returns
+// nullopt if that step is hardly shorter than the current one.
 std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanEarlyLanding(
     double phase) const {
   const Foot moving = MovingFoot(group().kind);
@@ -103,8 +103,8 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanEarlyLanding(
   return Redirection{*plan, {.movement = step}, true, false};
 }
 
-// Plans how the current step changes for the request at the head of the queue: a step of the same
-// foot to where the request needs it. Returns nullopt if the step has to land first.
+// Plans how the current step changes for the request at the head of the queue: into a step of the
+// same foot to the place that the request requires. Returns nullopt if the step must land first.
 std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(double phase) {
   const MovementRequest& request = queue_[queue_head_];
   const Foot moving = MovingFoot(group().kind);
@@ -116,8 +116,8 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(d
     STRIDEWIRE_CHECK(plan.has_value());
     return Redirection{*plan, redirected};
   }
-  // The other requests need planted feet. They wait while planting fades in: if they started a new
-  // fade-in, standing feet would move.
+  // Other requests require planted feet. They wait while planting fades in, because a new fade-in
+  // would move standing feet.
   const bool is_fading =
       movement_time_s_ < body_.movement.start_offset_s + body_.movement.feet.plant_fade_s;
   if (!body_.plants_feet || is_fading) return std::nullopt;
@@ -145,7 +145,7 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(d
   return redirection;
 }
 
-// Stores the state at `time_s` of the current movement that the next movement will blend from.
+// Stores the state at `time_s` of the current movement, from which the next movement will blend.
 void AvatarSimulation::CaptureBlendSource(double time_s) {
   const bool keeps_speed = options_.blend == BlendKind::kInertialization &&
                            time_s - body_.movement.start_offset_s >= kBlendStepS;
@@ -153,9 +153,8 @@ void AvatarSimulation::CaptureBlendSource(double time_s) {
   body_.CaptureBlendSource(time_s, keeps_speed);
 }
 
-// Records in change_, for replicas, that the avatar leaves the current movement at `time_s`.
-// Replicas do not know a movement that began in the same Advance, so such a change needs the whole
-// state.
+// Records in change_, for replicas, that the avatar leaves the current movement at `time_s`. If
+// that movement began in the same Advance, replicas do not know it, so they need the whole state.
 void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
   if (change_.has_left || change_.has_begun) {
     change_.needs_state = true;
@@ -169,16 +168,16 @@ void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
   change_.is_redirected = is_redirected;
 }
 
-// Replaces the current step by a step of the same foot, at the same phase, if the request at the
-// head of the queue allows that. Returns false if it does not. If the new step is rejected, the
-// current step continues.
+// If the request at the head of the queue allows it, replaces the current step with a step of the
+// same foot at the same phase. Otherwise, returns false. If the new step is rejected, the current
+// step continues.
 bool AvatarSimulation::Redirect(PlanScratch& scratch) {
   if (!may_redirect_ || IsStartDelayed() || !IsStep(group().kind) ||
       body_.plants_feet != foot_planting()) {
     return false;
   }
   const double phase = StepPhase();
-  // While both feet stand, the next movement may begin at once instead.
+  // While both feet stand, the next movement may start at once, so the step is not redirected.
   if (phase <= 1.0 || phase >= 2.0 - kLeastSwingLeft) return false;
   const auto redirection = PlanRedirection(phase);
   may_redirect_ = false;

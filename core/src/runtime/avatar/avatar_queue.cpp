@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-// A queue keeps memory for this many requests.
+// A queue keeps memory for this many requests when it becomes empty.
 constexpr std::size_t kUsualQueue = 8;
 
 }  // namespace
@@ -62,8 +62,8 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
     queue_head_ = 0;
   }
-  // Grow the queue in small steps and release its memory when it is empty. The queues of a whole
-  // crowd tend to be long at the same time, but only briefly.
+  // The queue grows in small steps and releases its memory when it is empty. In a crowd, many
+  // queues tend to be long at the same time, but only briefly.
   if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
   if (queue_.size() == queue_.capacity()) {
     queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
@@ -82,7 +82,7 @@ int AvatarSimulation::CancelQueue() {
 
 void AvatarSimulation::DropQueue(RequestOutcome outcome) {
   std::span<const MovementRequest> requests = queue();
-  // The next Advance reports what was dropped.
+  // The next Advance reports the dropped requests.
   if (!requests.empty()) next_event_s_ = -1.0;
   if (IsWalkInProgress()) {
     STRIDEWIRE_CHECK(!requests.empty() && requests.front().id == request_id_);
@@ -121,10 +121,10 @@ std::uint64_t AvatarSimulation::PopQueue() {
   return id;
 }
 
-// Adds the events of the requests that were dropped before this Advance.
+// Adds an event for each request that was dropped before this Advance.
 void AvatarSimulation::AddDroppedEvents() {
   max_events_ = kMaxEventsPerAdvance + dropped_.size();
-  // Release the memory of an earlier Advance with many dropped requests.
+  // Releases the memory that an earlier Advance with many dropped requests allocated.
   if (dropped_.empty() && events_.capacity() > kMaxEventsPerAdvance) {
     events_.shrink_to_fit();
     events_.reserve(kMaxEventsPerAdvance);
@@ -138,7 +138,7 @@ void AvatarSimulation::AddDroppedEvents() {
   }
 }
 
-// Reports the end of a walk that was dropped during its last step, which has just ended.
+// Reports the end of a walk that was dropped during its last step. The step has just ended.
 void AvatarSimulation::EndDroppedWalk() {
   if (walk_outcome_ == RequestOutcome::kNone) return;
   AddEvent({.type = AvatarEventType::kDropped,

@@ -13,15 +13,15 @@
 namespace stridewire {
 namespace {
 
-// Limits on the numbers of a record, in metres, seconds or radians, and on weights.
+// Limits on the numbers in a record, in metres, seconds or radians, and on weights.
 constexpr double kMaxNumber = 1e9;
 constexpr float kMaxWeight = 1e3f;
-// Tolerance for the squared length of rotations, which products of rotations need.
+// Tolerance for the squared length of quaternions. Products of rotations need it.
 constexpr float kUnitTolerance = 0.02f;
 
 }  // namespace
 
-// Reads the fields of a record. Keeps the first error; every field read after it is 0.
+// Reads the fields of a record. Keeps the first error. All fields read after it are 0.
 class AvatarReplica::Reader {
  public:
   explicit Reader(std::span<const std::byte> record) : record_(record) {}
@@ -134,7 +134,7 @@ void ReadWeights(const MotionLibrary& library, bool plants_feet, Movement& movem
   }
 }
 
-// Rejects playback speeds that no avatar uses, because keytimes are divided by them.
+// Rejects playback speeds that no avatar uses, because keytimes are divided by the speed.
 template <typename Reader>
 void CheckRate(double rate, Reader& reader) {
   if (!(rate >= kMinRate && rate <= kMaxRate)) {
@@ -191,7 +191,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& 
 }
 
 void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch) {
-  // Check each part of the record before applying it, because the steps cannot be undone.
+  // Each part of the record is checked before it is applied, because changes cannot be undone.
   Movement& movement = body_.movement;
   const bool has_left = (flags & record::kLeft) != 0;
   const bool has_begun = (flags & record::kMoves) != 0;
@@ -336,8 +336,9 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double 
       if (!replica.is_time_set_) replica.movement_time_s_ += dt_s;
       if (replica.ahead_index_ < replica.ahead_count_) continue;
       const Movement& movement = replica.body_.movement;
-      // Replicas next to each other end their runs in the same tick and are then evaluated side by
-      // side, but different ones in each tick.
+      // Replicas that are next to each other evaluate poses in the same tick, so that they can be
+      // evaluated side by side. Different groups of replicas do so in different ticks, to
+      // distribute the load.
       const std::size_t phase = (evaluator.tick_ + i / SoaPose::kLanes) % kTicksAhead;
       const int count = SampleRunCount(movement, replica.movement_time_s_, dt_s, 1,
                                        static_cast<int>(kTicksAhead - phase));

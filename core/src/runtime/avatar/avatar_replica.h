@@ -12,8 +12,8 @@
 
 namespace stridewire {
 
-/// Memory for AvatarReplica::AdvanceAll. It may be shared by all replicas with the same library.
-/// Not thread-safe. Allocates only in its constructor.
+/// Memory for AvatarReplica::AdvanceAll. All replicas with the same library may share it. Not
+/// thread-safe. Allocates only in its constructor.
 class ReplicaEvaluator {
  public:
   /// `library` must outlive the evaluator.
@@ -33,32 +33,34 @@ class ReplicaEvaluator {
 /// movement_record.h) and evaluates the same poses, bit for bit, in the same ticks. Not
 /// thread-safe; one owner. Allocates only in its constructor.
 ///
-/// For each tick, call Apply with the record of the tick, if there is one, and then AdvanceAll with
-/// the length of the avatar's tick.
+/// For each tick, call Apply with the record of the tick, if there is one. Then call AdvanceAll
+/// with the length of the avatar's tick.
 class AvatarReplica {
  public:
   /// The replica is unknown until it receives a state. `library` must be the avatar's library.
   explicit AvatarReplica(std::shared_ptr<const MotionLibrary> library);
 
-  /// True if a record contains a whole state, false if it contains a change.
+  /// Returns true if a record contains a whole state, false if it contains a change.
   [[nodiscard]] static bool IsState(std::span<const std::byte> record);
 
-  /// Applies the record of a tick. No change may be skipped; a state may arrive at any time.
+  /// Applies the record of a tick. Changes must be applied without gaps. A state may arrive at any
+  /// time.
   ///
-  /// kMalformed: the record is invalid, or does not fit the library or the current state.
-  /// kNotFound: a change arrived before any state. The index of an error is the offset in the
-  /// record. After an error the replica is unknown until the next state.
+  /// Errors: kMalformed if the record is invalid, or does not fit the library or the current state.
+  /// kNotFound if a change arrives before any state. Error::index is the offset in the record.
+  /// After an error, the replica is unknown until the next state.
   [[nodiscard]] Status Apply(std::span<const std::byte> record, FootPlanScratch& scratch);
 
-  /// Advances replicas by one tick and evaluates their poses. All must have the same library. Each
-  /// may occur only once. Unknown replicas are skipped. A movement that does not change is
+  /// Advances replicas by one tick and evaluates their poses. All must have the same library, and
+  /// each may occur only once. Unknown replicas are skipped. A movement that does not change is
   /// evaluated for several ticks at once, which reads the library less often. Pass the replicas in
-  /// the same order in each tick, because their positions decide in which ticks they are evaluated.
-  /// All calls need the same `dt_s`, unless the replica receives a state between them.
+  /// the same order in every tick, because their positions determine in which ticks they are
+  /// evaluated. `dt_s` must be the same in all calls, unless the replica receives a state in
+  /// between.
   static void AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
                          ReplicaEvaluator& evaluator);
 
-  /// True if the replica has received a state and no error occurred since.
+  /// True if the replica has received a state, and no error has occurred since then.
   [[nodiscard]] bool is_known() const { return is_known_; }
   /// The displayed pose in world space, after AdvanceAll. Undefined while the replica is unknown.
   [[nodiscard]] ConstPoseSpan pose() const {
@@ -88,15 +90,16 @@ class AvatarReplica {
   bool is_known_ = false;
   bool is_moving_ = false;
   bool is_idle_ = false;
-  // The last record set the movement time (or the layers) for the next tick, so AdvanceAll must not
-  // advance it.
+  // True if the last record set the movement time (or the layers) of the next tick, so AdvanceAll
+  // must not advance it.
   bool is_time_set_ = false;
   bool are_layers_set_ = false;
   // Poses of successive ticks of the movement, without layers.
   std::array<Vec3, kTicksAhead> ahead_roots_m_ = {};
   std::vector<Quat> ahead_rotations_;  // [kTicksAhead][joint]
   std::size_t ahead_count_ = 0;
-  std::size_t ahead_index_ = 0;  // Pose of the next tick; the displayed pose is the one before.
+  // Index of the next tick's pose. The displayed pose is the one before it.
+  std::size_t ahead_index_ = 0;
 };
 
 }  // namespace stridewire

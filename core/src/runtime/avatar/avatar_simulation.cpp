@@ -16,14 +16,15 @@
 namespace stridewire {
 namespace {
 
-// A movement can add up to this many events in one tick: started, two foot strikes, finished, the
-// end of a dropped walk, the end of a walk or a rejection, and the start of the next movement.
+// Maximum number of events that a movement can add in one tick: started, two foot strikes,
+// finished, the end of a dropped walk, the end of a walk or a rejection, and the start of the next
+// movement.
 constexpr std::size_t kEventReserve = 7;
 // A tick usually has at most three events: finished, started and foot strike. The list grows if
 // there are more.
 constexpr std::size_t kUsualEvents = 3;
-// Phase at which a jump starts if it interrupts another movement. In between, the blend from the
-// previous pose replaces the start of the crouch.
+// Phase at which a jump that interrupts another movement starts. The blend from the previous pose
+// replaces the skipped part of the crouch.
 constexpr double kJumpStartPhase = 0.25;
 
 }  // namespace
@@ -154,7 +155,7 @@ void AvatarSimulation::AdvanceAll(std::span<AvatarSimulation* const> avatars, do
   UpdatePoses(avatars, evaluator);
 }
 
-// Prefetches what AdvanceEventfully reads of a walking avatar.
+// Prefetches the data of a walking avatar that AdvanceEventfully reads.
 void AvatarSimulation::PrefetchState() const {
   PrefetchBytes(&change_, sizeof(change_) + sizeof(next_change_));
   PrefetchBytes(&events_, 1);
@@ -204,7 +205,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     STRIDEWIRE_CHECK(left_s >= 0.0);
     STRIDEWIRE_CHECK(!(is_moving_ && is_in_stand_));
     // Movements that are shorter than a tick could overflow the event list. Once the list is nearly
-    // full, nothing more starts or ends in this tick.
+    // full, no further movement starts or ends in this tick.
     const bool may_change = events_.size() + kEventReserve <= max_events_;
     if (is_moving_) {
       const double before_s = movement_time_s_;
@@ -232,8 +233,8 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     if (!may_change || !StartNext(scratch)) break;
   }
   STRIDEWIRE_CHECK(time_s_ <= end_s);
-  // Idle motion that continues advances by the whole tick at once, as replicas advance it: a sum of
-  // two parts of a tick may differ in the last bit.
+  // If idle motion continues, it advances by the whole tick at once, as replicas advance it. A sum
+  // of two parts of a tick may differ in the last bit.
   if (!is_moving_) AdvanceIdleMotion(is_idling_ ? dt_s : left_s, scratch);
   time_s_ = end_s;
   change_.idle_changed = idle() != std::exchange(was_idle_, idle());
@@ -246,12 +247,13 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
   if (is_walking_ && (is_empty || stand != nullptr)) {
-    // The walk ends here. Bring the feet together, so that the avatar does not stop in mid-stride.
+    // The walk ends here. The feet are brought together, so that the avatar does not stop in
+    // mid-stride.
     is_walking_ = false;
     SwitchPlanting();
     if (auto plan = PlanClosingStep()) {
       if (is_hurried) plan->max_rate = kHurriedRate;
-      EndIdleMotion();  // The avatar may have begun to idle while the next request was delayed.
+      EndIdleMotion();  // The avatar may have started to idle while the next request was delayed.
       StartInserted(*plan, scratch);
       return true;
     }
@@ -289,11 +291,11 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   return true;
 }
 
-// Starts the step or jump at the head of the queue, or a step that must come before it.
+// Starts the step or jump at the head of the queue, or a step that must precede it.
 void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch) {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
-  STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
+  STRIDEWIRE_CHECK(direct.has_value());  // Enqueue has checked that the library has this kind.
   TransitionPath path =
       FindTransitionPath(*body_.library, request, direct,
                          {feet_, last_moved_, last_group_, inserted_steps_, landing_conditions()});
@@ -329,8 +331,8 @@ void AvatarSimulation::StartInserted(const RequestPlan& plan, PlanScratch& scrat
   inserted_steps_ = inserted;
 }
 
-// Plans the next step of the walk at the head of the queue, from where the feet stood when the last
-// step ended.
+// Plans the next step of the walk at the head of the queue, from the positions of the feet at the
+// end of the last step.
 WalkDecision AvatarSimulation::PlanNextWalkStep(WalkProgress& progress) const {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -358,7 +360,8 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
     is_walk_step_ = true;
     return;
   }
-  const double speed_m_s = walk_pace_.mean_m_s();  // PopQueue may reset walk_pace_.
+  // Read before PopQueue, which may reset walk_pace_.
+  const double speed_m_s = walk_pace_.mean_m_s();
   const std::uint64_t id = PopQueue();
   walk_ = {};
   walk_pace_ = {};
@@ -384,8 +387,8 @@ DVec3 AvatarSimulation::StandingPosition(Foot foot) const {
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
-// Returns the height of the ground where a step would land above the ground at the standing foot,
-// in metres.
+// Returns the height of the ground where a step would land, relative to the ground at the standing
+// foot, in metres.
 double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   const Foot foot = step.foot.value_or(OtherFoot(last_moved_));
   const auto f = static_cast<std::size_t>(foot);
@@ -397,8 +400,9 @@ double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   return GroundRise(options_.terrain->HeightAt(planted.x, planted.z) - stands.y);
 }
 
-// Returns the footprint that a step by length requests. Without a side, the feet end as far apart
-// as in a walk or, if they end side by side, as in the stand pose.
+// Returns the footprint that a step by length requests. If the request does not specify the side,
+// the feet end as far apart sideways as in a walk. If they end side by side, they end as far apart
+// as in the stand pose.
 FootprintRequest AvatarSimulation::FootprintOf(const StepRequest& step) const {
   STRIDEWIRE_CHECK(step.foot.has_value());
   const LocomotionProfile& profile = body_.library->locomotion_profile();
@@ -423,7 +427,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
     step.at = FootprintOf(step);
   }
 
-  // A step to a footprint is planned relative to the foot that stays.
+  // A step to a footprint is planned relative to the staying foot.
   Footprint exact{step.at->position_m, step.at->heading_rad.value_or(base_.heading_rad)};
   exact.heading_rad = UnwrapAngle(exact.heading_rad, base_.heading_rad);
   if (options_.terrain != nullptr) {
@@ -437,7 +441,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   }
   auto plan = PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
                             base_.heading_rad, feet_, FootprintUse::kRequested);
-  // Whether a leg reaches a footprint depends on the whole pose, so such a step must not vary.
+  // The whole pose determines whether a leg reaches a footprint, so such a step must not be varied.
   if (plan) plan->is_varied = !step.exact_only;
   return plan;
 }
@@ -448,8 +452,7 @@ void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_
   BeginMovement(plan, request_id);
 }
 
-// Plans a movement. If it replaces a step of the same foot, it starts at the phase that the step
-// has reached.
+// Plans a movement. If it replaces a step of the same foot, it starts at the phase of that step.
 void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
                                     PlanScratch& scratch) {
   STRIDEWIRE_CHECK(&scratch.feet.library() == body_.library.get());
@@ -477,7 +480,7 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
   if (start_phase > 0.0) {
     body_.SetStartOffset(TimeAtPhase(SwingTimesOf(next.kind, body_.movement), start_phase));
   }
-  // An avatar that was standing has no speed to keep.
+  // If the avatar was standing, it has no velocity to keep.
   body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed(),
                 scratch.feet);
 }
@@ -520,8 +523,9 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
             .clamped = is_met ? false : plan.clamped});
 }
 
-// Keeps straight steps on the line of the walk. Groups without a sideways parameter determine the
-// position of the base only along the walking direction. Sideways, it follows the body.
+// Keeps straight steps on the line of the walk. In groups without a sideways parameter, the
+// examples determine the position of the base only along the walking direction. Sideways, the base
+// follows the body.
 void AvatarSimulation::KeepToLine(const DVec3& line_m) {
   if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
   const double heading_rad = body_.movement.base.heading_rad;
@@ -539,8 +543,8 @@ void AvatarSimulation::FinishMovement(double at_s) {
   RecordLeaving(at_s, false);
   movement_time_s_ = at_s;
   ++revision_;
-  // Without planting, the base frame follows the root, and its height changes by the movement's own
-  // rise.
+  // Without planting, the base frame follows the root, and its height changes by the rise of the
+  // movement.
   const BaseFrame before = base_;
   base_ = BaseAfter(body_.movement, body_.pose);
   base_.position_m.y = before.position_m.y + (has_moved ? ground_rise_m_ : 0.0);

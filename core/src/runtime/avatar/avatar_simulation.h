@@ -27,20 +27,20 @@ namespace stridewire {
 
 /// Changes of an avatar's movement during an Advance. Movement records are derived from them.
 struct AvatarChange {
-  /// A change record cannot express what happened; send the whole state.
+  /// True if a change record cannot express the changes, so that the whole state must be sent.
   bool needs_state = false;
-  bool has_left = false;      ///< The previous movement ended or was interrupted.
-  bool has_begun = false;     ///< A movement began and is still in progress.
-  bool has_layers = false;    ///< SetLayer was called.
+  bool has_left = false;      ///< True if the previous movement ended or was interrupted.
+  bool has_begun = false;     ///< True if a movement began and is still in progress.
+  bool has_layers = false;    ///< True if SetLayer was called.
   bool idle_changed = false;  ///< idle() changed.
   /// True if the previous movement was completed, false if it was interrupted.
   bool is_left_at_end = false;
-  /// The new movement began in the middle of the previous one's swing.
+  /// True if the new movement began during the swing of the previous one.
   bool is_redirected = false;
   /// Argument of AvatarBody::CaptureBlendSource for the previous movement.
   bool left_keeps_speed = false;
   bool begun_keeps_speed = false;  ///< Argument of AvatarBody::BlendIn for the new movement.
-  double left_s = 0.0;             ///< Time within the previous movement at which it was left.
+  double left_s = 0.0;  ///< Time within the previous movement at which the avatar left it.
 
   bool operator==(const AvatarChange&) const = default;
 };
@@ -51,9 +51,11 @@ struct AvatarChange {
 /// Simulates one avatar: base frame, queue of requests, current movement, displayed pose.
 ///
 /// Time is an argument; only Advance moves the avatar. The same library, start, requests and time
-/// steps give the same pose bytes on every machine. Not thread-safe; one owner. After construction
-/// only these allocate: Enqueue, for a queue of up to kMaxQueue requests; calls that drop requests;
-/// SetLayer; the first Advance; and an Advance with more events than any before.
+/// steps give the same pose bytes on every machine. Not thread-safe; one owner.
+///
+/// After construction, only these calls allocate: Enqueue, for a queue of up to kMaxQueue requests;
+/// calls that drop requests; SetLayer; the first Advance; and an Advance with more events than any
+/// before.
 class AvatarSimulation {
  public:
   static constexpr int kMaxQueue = Avatar::kMaxQueue;
@@ -63,17 +65,17 @@ class AvatarSimulation {
   AvatarSimulation(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
                    const AvatarOptions& options = {});
 
-  /// A swing is redirected only if more than this fraction of it is left.
+  /// A swing is redirected only if more than this fraction of it remains.
   static constexpr double kLeastSwingLeft = 0.4;
 
-  /// Validates and queues a request. A request that interrupts empties the queue first.
+  /// Validates and queues a request. A request with an interrupt first empties the queue.
   ///
-  /// Errors: those of ValidateRequest; kUnsupported: exact placement was requested while feet are
-  /// not planted; kLimitExceeded: the queue is full.
+  /// Errors: those of ValidateRequest; kUnsupported if exact placement is requested while feet are
+  /// not planted; kLimitExceeded if the queue is full.
   ///
-  /// `start_delay_s` (>= 0) delays the start. A standing avatar does not begin the request earlier
-  /// than that from now, and a moving avatar is not interrupted earlier. A request that follows
-  /// another movement is not delayed. An existing delay is not extended.
+  /// `start_delay_s` (>= 0) delays the start. A standing avatar begins the request after this delay
+  /// at the earliest, and a moving avatar is not interrupted earlier. If the request follows
+  /// another movement, it is not delayed. An existing delay is not extended.
   [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
 
   /// Drops the requests that have not started and returns their number. The current movement
@@ -81,27 +83,27 @@ class AvatarSimulation {
   int CancelQueue();
 
   /// Drops the queue and the request of the current movement. Call it only before removing or
-  /// moving the avatar, because the movement itself continues.
+  /// teleporting the avatar, because the movement itself continues.
   void DropAll(RequestOutcome outcome);
 
-  /// Returns and forgets the requests that were dropped since the last Advance. The next Advance
-  /// reports those that were not taken as events.
+  /// Returns the requests that were dropped since the last Advance, and removes them from the list.
+  /// The next Advance reports the remaining ones as events.
   [[nodiscard]] std::vector<DroppedRequest> TakeDropped() { return std::exchange(dropped_, {}); }
 
   /// Starts, changes or ends a layer with the next Advance. The legs and the root keep exactly the
-  /// bits they have without layers. Errors are those of LayerStack::Set.
+  /// same bits as without layers. Errors are those of LayerStack::Set.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
-  /// Moves the avatar to `start` at once, standing. Drops the current movement and the queue, and
-  /// keeps the layers.
+  /// Moves the avatar to `start` at once. It then stands. Drops the current movement and the queue,
+  /// and keeps the layers.
   void Teleport(const BaseFrame& start);
 
-  /// Enables or disables foot planting, without a visible jump, from the next movement on. Until
-  /// that movement starts, swings are not redirected. While planting is off, queued requests for
-  /// exact placement are rejected when their turn comes. kUnsupported: this skeleton does not
-  /// support foot planting.
+  /// Enables or disables foot planting from the next movement on, without a visible jump. Until
+  /// that movement starts, swings are not redirected. While planting is disabled, queued requests
+  /// for exact placement are rejected when they would start. Fails with kUnsupported if the
+  /// skeleton does not support foot planting.
   [[nodiscard]] Status SetFootPlanting(bool enabled);
-  /// The last setting; false if the skeleton does not support foot planting.
+  /// The last setting. False if the skeleton does not support foot planting.
   [[nodiscard]] bool foot_planting() const {
     return options_.foot_planting && body_.library->leg_rig().is_usable;
   }
@@ -109,19 +111,19 @@ class AvatarSimulation {
   /// Replaces the terrain. Standing feet keep their positions until their next step.
   void SetTerrain(std::shared_ptr<const Terrain> terrain) { options_.terrain = std::move(terrain); }
 
-  /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, updates the pose.
-  /// The events of this call are available from events() until the next call. The first call
-  /// allocates scratch memory; use AdvanceAll for many avatars.
+  /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, and updates the
+  /// pose. The events of this call are available from events() until the next call. The first call
+  /// allocates scratch memory. For many avatars, use AdvanceAll.
   void Advance(double dt_s);
 
-  /// Advances many avatars of one library and evaluates their poses together, several times as fast
-  /// as one by one. No bit of a pose depends on the other avatars.
+  /// Advances many avatars of one library and evaluates their poses together, which is several
+  /// times as fast as Advance for each of them. No bit of a pose depends on the other avatars.
   static void AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
                          PlanScratch& scratch, SoaPoseEvaluator& evaluator);
 
   /// Like AdvanceAll, but without poses, for callers that evaluate poses themselves (SampleRun).
-  /// pose() is outdated until UpdatePose. `eventful` receives, in increasing order, the indices in
-  /// `avatars` of those that are not event-free afterwards.
+  /// pose() is outdated until UpdatePose. `eventful` receives the indices in `avatars` of those
+  /// that are not event-free afterwards, in increasing order.
   static void AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
                             PlanScratch& scratch, std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
@@ -135,7 +137,8 @@ class AvatarSimulation {
   /// Everything that the displayed pose and the next movement depend on. It corresponds to pose()
   /// until the next Advance, Teleport or SetLayer.
   [[nodiscard]] const AvatarBody& body() const { return body_; }
-  /// Returns the changes of the last Advance, including calls of Teleport and SetLayer before it.
+  /// Returns the changes of the last Advance. They include calls of Teleport and SetLayer before
+  /// it.
   [[nodiscard]] const AvatarChange& change() const { return change_; }
   /// True if a movement that begins now continues with the velocity of the previous one.
   [[nodiscard]] bool keeps_speed() const { return moved_until_s_ == time_s_; }
@@ -148,7 +151,7 @@ class AvatarSimulation {
 
   /// The current movement, or null while standing. Valid until the next Advance.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
-  /// The movement that the displayed pose follows: the current movement or, while standing, the
+  /// The movement that determines the displayed pose: the current movement or, while standing, the
   /// idle motion. Null if the avatar stands still. Valid until the next Advance.
   [[nodiscard]] const Movement* displayed_movement() const {
     return is_moving_ || is_idling_ ? &body_.movement : nullptr;
@@ -156,17 +159,18 @@ class AvatarSimulation {
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// Seconds since construction.
   [[nodiscard]] double time_s() const { return time_s_; }
-  /// Changes whenever a movement or idle motion begins or ends, and on Teleport. While it stays the
+  /// Changes whenever a movement or idle motion starts or ends, and on Teleport. While it stays the
   /// same, the displayed pose without layers follows from displayed_movement() and
   /// movement_time_s().
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// True if the avatar moves or idles, has no layers, and the last Advance produced neither events
-  /// nor changes. While it is true, time_s(), revision(), movement_time_s() and idle() are in one
-  /// cache line.
+  /// nor changes. In this case, time_s(), revision(), movement_time_s() and idle() are in one cache
+  /// line.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
   /// Prefetches that cache line, for callers that check many avatars.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
-  /// The kStarted event of the current movement or requested stand; null if the avatar just stands.
+  /// The kStarted event of the current movement or requested stand. Null if the avatar stands
+  /// without a request.
   [[nodiscard]] const AvatarEvent* started() const {
     return is_moving_ || is_in_stand_ ? &started_ : nullptr;
   }
@@ -179,7 +183,7 @@ class AvatarSimulation {
   static constexpr const char* kNeedsPlanting = "exact placement requires foot planting";
 
   // Scratch memory for Advance, which handles a single avatar. The first call allocates it. Copies
-  // of the avatar allocate their own.
+  // of the avatar allocate their own memory.
   class OwnScratch {
    public:
     OwnScratch() = default;
@@ -197,7 +201,7 @@ class AvatarSimulation {
   // A step that replaces the current step of the same foot while it is in progress.
   struct Redirection {
     RequestPlan plan;
-    MovementRequest request;     // Requested step; for other steps, the id of their request.
+    MovementRequest request;     // Requested step or, for other steps, the id of their request.
     bool is_inserted = false;    // True if no request contains the step.
     bool ends_interrupt = true;  // False if the interrupting request starts after this step.
   };
@@ -211,12 +215,12 @@ class AvatarSimulation {
   [[nodiscard]] bool IsWalkInProgress() const {
     return is_moving_ && is_walk_step_ && walk_outcome_ == RequestOutcome::kNone;
   }
-  // Returns how the request of the current movement ends when the movement does.
+  // Returns how the request of the current movement ends when the movement ends.
   [[nodiscard]] RequestOutcome MovementOutcome(bool is_cut_short) const {
     if (is_walk_step_ || request_id_ == 0) return RequestOutcome::kNone;
     return is_cut_short ? RequestOutcome::kReplaced : RequestOutcome::kCompleted;
   }
-  // time_s_ is a rounded sum of ticks. The margin prevents a delay of whole ticks from lasting one
+  // time_s_ is a rounded sum of ticks. Without the margin, a delay of whole ticks could last one
   // tick longer.
   [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
   [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
@@ -280,12 +284,12 @@ class AvatarSimulation {
   [[nodiscard]] double StrikeTime() const;
   void ReportFootStrikes(double before_s, double after_s);
 
-  // Everything that an event-free tick reads is in one cache line.
+  // All data that an event-free tick reads is in one cache line.
   alignas(kCacheLineBytes) double time_s_ = 0.0;  // Avatar time.
   double movement_time_s_ = 0.0;
   double next_event_s_ = -1.0;  // Movement time before which no event can happen; -1 if unknown.
   std::uint64_t revision_ = 0;
-  // At most one of the following is true: a movement is in progress, or a requested stand is.
+  // At most one of these is true: a movement is in progress, or a requested stand is in progress.
   bool is_moving_ = false;
   bool is_in_stand_ = false;
   bool is_idling_ = false;   // True while body_.movement is the settle or idle motion.
@@ -298,30 +302,30 @@ class AvatarSimulation {
   bool interrupts_ = false;
   // True until the avatar has tried to redirect the current step for that request.
   bool may_redirect_ = false;
-  bool is_exact_ = false;      // True if the current step goes to a requested footprint.
+  bool is_exact_ = false;      // True if the current step leads to a requested footprint.
   bool is_walk_step_ = false;  // True if the current or last movement is a step of a walk.
-  // Outcome of that walk if it was dropped. It is reported when the step has ended.
+  // Outcome of that walk if it was dropped. It is reported when the step ends.
   RequestOutcome walk_outcome_ = RequestOutcome::kNone;
   bool is_stand_cut_short_ = false;  // True if a request has ended the current stand.
-  // Number of steps that were inserted in a row, including the current movement.
+  // Number of successive inserted steps, including the current movement.
   int inserted_steps_ = 0;
   std::uint64_t movement_number_ = 0;  // Number of movements that have begun.
   double start_not_before_s_ = 0.0;    // Avatar time.
-  // Avatar time at which the last movement with a velocity ended, or -1.
+  // Avatar time at which the last movement with a velocity ended; -1 if unknown.
   double moved_until_s_ = -1.0;
 
   AvatarOptions options_;
   BaseFrame base_;
   AvatarBody body_;
   AvatarChange change_;           // Changes during the last Advance.
-  AvatarChange next_change_;      // Changes since the last Advance, which the next Advance reports.
+  AvatarChange next_change_;      // Changes since the last Advance. The next Advance reports them.
   std::uint64_t request_id_ = 0;  // Request id of the current movement or stand.
   double stand_left_s_ = 0.0;
   AvatarEvent started_;
   // Height of the base frame after the movement minus its height before the movement.
   double ground_rise_m_ = 0.0;
-  // State to restore if a planned movement is rejected. Allocated by the first request for exact
-  // placement.
+  // State that is restored if a planned movement is rejected. The first request for exact placement
+  // allocates it.
   struct SavedState {
     Movement movement;
     Pose pose;
@@ -332,7 +336,7 @@ class AvatarSimulation {
   FootState stand_feet_;  // Relative position of the feet in the library's stand pose.
   FootState feet_;
   Foot last_moved_ = Foot::kRight;
-  // Group of the previous movement, or the number of groups after a stand.
+  // Group of the previous movement. After a stand, the number of groups.
   std::size_t last_group_ = 0;
   WalkProgress walk_;   // Progress of the walk at the head of the queue.
   WalkPace walk_pace_;  // Speed of the walk at the head of the queue.
@@ -340,7 +344,7 @@ class AvatarSimulation {
   std::vector<MovementRequest> queue_;
   std::size_t queue_head_ = 0;
   std::vector<AvatarEvent> events_;
-  std::size_t max_events_ = kMaxEventsPerAdvance;  // Limit of events_ in this Advance.
+  std::size_t max_events_ = kMaxEventsPerAdvance;  // Limit on the size of events_ in this Advance.
   std::vector<DroppedRequest> dropped_;  // Requests that were dropped since the last Advance.
   OwnScratch own_scratch_;
 };

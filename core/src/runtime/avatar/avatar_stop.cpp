@@ -8,12 +8,12 @@
 namespace stridewire {
 namespace {
 
-// A second or third closing step must bring the feet closer by at least this much.
+// Minimum distance by which a second or third closing step must bring the feet closer together.
 constexpr double kClosingGainM = 0.03;
-// A step that ends this close to the stand needs no help from planting.
+// If a step ends this close to the stand pose, it needs no correction by planting.
 constexpr double kClosedM = 0.03;
-// An avatar does not bring its feet together if they would then stand at heights that differ by
-// more than this and by more than they do now, for example on a stone that has room for one foot.
+// An avatar does not bring its feet together if their heights would then differ by more than this
+// and by more than they do now. An example is a stone with room for only one foot.
 constexpr double kMaxStandClimbM = 0.15;
 
 // Returns the forward distance between the feet at the end of a planned step.
@@ -25,7 +25,7 @@ double EndLength(const MotionLibrary& library, const RequestPlan& plan) {
 }  // namespace
 
 // Plans a step that brings the feet together, or the first of two such steps. Returns nullopt if
-// the library has none, because any other step would only end in another stride.
+// the library has none, because any other step would only end with the feet apart again.
 std::optional<RequestPlan> AvatarSimulation::PlanClosingStep() const {
   const MotionLibrary& library = *body_.library;
   const bool is_planted = body_.plants_feet;
@@ -64,7 +64,7 @@ DVec3 AvatarSimulation::PlaceBeside(Foot fixed) const {
   return StandingPosition(fixed) + RotateYaw(base_.heading_rad, DVec3(vector.x, 0.0, vector.z));
 }
 
-// Returns true if the ground beside a standing foot is high and low enough for the other foot.
+// Returns true if the height of the ground beside a standing foot is suitable for the other foot.
 bool AvatarSimulation::HasGroundBeside(Foot fixed) const {
   if (options_.terrain == nullptr || !body_.plants_feet) return true;
   const double fixed_m = StandingPosition(fixed).y;
@@ -74,7 +74,7 @@ bool AvatarSimulation::HasGroundBeside(Foot fixed) const {
          climb_m <= std::fabs(StandingPosition(OtherFoot(fixed)).y - fixed_m);
 }
 
-// Plans a step onto the place of a foot beside the other foot. Planting brings the foot there,
+// Plans a step to the place of a foot beside the other foot. Planting brings the foot there,
 // although the library's own step ends elsewhere.
 std::optional<RequestPlan> AvatarSimulation::PlanPlantedClosingStep(Foot foot) const {
   if (!HasGroundBeside(OtherFoot(foot))) return std::nullopt;
@@ -90,7 +90,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanPlantedClosingStep(Foot foot) c
   return plan;
 }
 
-// Returns the reason why the feet are apart while the avatar stands, or an empty string.
+// Returns why the feet are apart while the avatar stands, or an empty string if they are together.
 const char* AvatarSimulation::WhyFeetAreApart() const {
   if (!AreFeetApart(feet_, stand_feet_)) return "";
   return HasGroundBeside(last_moved_)

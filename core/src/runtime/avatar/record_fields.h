@@ -15,14 +15,14 @@ namespace stridewire::record {
 
 enum Flag : std::uint16_t {
   kIsState = 1 << 0,
-  kMoves = 1 << 1,   // Change: a movement began. State: a movement is in progress.
+  kMoves = 1 << 1,   // In a change: a movement began. In a state: a movement is in progress.
   kIsIdle = 1 << 2,  // AvatarSimulation::idle().
   kPlants = 1 << 3,  // Value of AvatarBody::plants_feet.
   kLayers = 1 << 4,  // The record contains layers. A state without this flag has no layers.
   // Changes only:
   kLeft = 1 << 5,       // The previous movement ended or was interrupted.
   kLeftAtEnd = 1 << 6,  // The previous movement was completed, so its end time is omitted.
-  // The previous movement was redirected in mid-swing; the foot locks remain unchanged.
+  // The previous movement was redirected in mid-swing. The foot locks remain unchanged.
   kIsRedirected = 1 << 7,
   // Argument of AvatarBody::CaptureBlendSource for the previous movement.
   kLeftKeepsSpeed = 1 << 8,
@@ -160,9 +160,10 @@ void PlanFields(Stream& stream, P& plan) {
   }
 }
 
-// True if part of the difference pose may still be needed.
+// Returns true if a part of the difference pose may still be needed.
 inline bool NeedsDifference(const Movement& movement, double movement_time_s) {
-  // A blend looks back by kBlendStepS. Use twice that, so that rounding cannot matter.
+  // A blend uses the pose kBlendStepS earlier. The margin is twice as large, so that rounding has
+  // no effect.
   return movement_time_s - 2.0 * kBlendStepS < movement.start_offset_s + movement.ease_out_s;
 }
 

@@ -14,15 +14,15 @@ namespace stridewire {
 ///               then a cubic that continues with the same offset and velocity and ends at
 ///               t >= land: to - b(t)
 ///   heading:    locked while the sole is on the ground; with the heel up it follows the blend
-///   height:     values to add, eased from one to the next, and `level_m`; otherwise the ball's
-///               height follows the blend, because locking it would bend knees by 25 degrees on
+///   height:     values to add, eased from one to the next, and `level_m`. The height of the ball
+///               otherwise follows the blend, because a lock would bend knees by 25 degrees on
 ///               captures (but see locks_height)
 struct FootTrajectory {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
   Footprint from;  ///< Footprint at the start.
   Footprint to;    ///< Footprint at the end.
-  /// Time at which the foot leaves `from`; kNever: it stands throughout the movement.
+  /// Time at which the foot leaves `from`. kNever: it stands throughout the movement.
   double release_s = kNever;
   double land_s = kNever;  ///< Time at which the foot comes to rest on `to`.
   DVec3 release_offset_m = DVec3(0.0);
@@ -32,26 +32,28 @@ struct FootTrajectory {
   DVec3 land_offset_m = DVec3(0.0);
   DVec3 land_velocity_m_s = DVec3(0.0);
   // Corrections of the height and heading of the blended foot: at t = 0, after the difference pose
-  // has faded, and from landing on. If `locks_height`, the heights of the ball above the footprint.
+  // has faded out, and from landing on. If `locks_height`, heights of the ball above the footprint.
   std::array<double, 3> height_m{};
   std::array<double, 3> turn_rad{};
-  /// Coefficients of u, u^2, u^3 and u^4 of a further height to add, where u is the elapsed
-  /// fraction of the movement. It keeps the sole of a step's supporting foot on the ground.
+  /// Coefficients of u, u^2, u^3 and u^4 of an additional height, where u is the elapsed fraction
+  /// of the movement. It keeps the sole of a step's supporting foot on the ground.
   std::array<double, 4> level_m{};
-  /// Largest value of another height to add while the difference pose fades out. Otherwise the foot
+  /// Maximum of another additional height while the difference pose fades out. Without it the foot
   /// would sink, because the rotations of the legs and the height of the root fade differently.
   double settle_lift_m = 0.0;
-  /// Lock the height of the ball as well. A standing avatar needs that, because its legs straighten
-  /// while its feet must stay on the ground.
+  /// True if the height of the ball is locked as well. A standing avatar needs this, because its
+  /// legs straighten while its feet must stay on the ground.
   bool locks_height = false;
   /// Ground normals at `from` and `to`.
   std::array<Vec3, 2> normals{Vec3(0.0f, 1.0f, 0.0f), Vec3(0.0f, 1.0f, 0.0f)};
-  /// Additional heights early, in the middle and late in the swing, to clear the ground. Each is
-  /// the peak of a curve that fades in and out (LiftShare). The one in the middle may be negative.
+  /// Additional heights early, in the middle and late in the swing, which clear the ground. Each is
+  /// the peak of a curve that fades in and out (LiftShare). The middle one may be negative.
   std::array<double, 3> lift_m{};
-  /// Horizontal offset in the middle of the swing, to pass the other foot and the edges of treads.
+  /// Horizontal offset in the middle of the swing, for passing the other foot and the edges of
+  /// treads.
   DVec3 mid_swing_offset_m = DVec3(0.0);
-  /// Share of the foot's correction by which the root moves; the shares of both feet sum to 1.
+  /// Fraction of the foot's correction by which the root moves. The fractions of both feet sum to
+  /// 1.
   double root_weight = 0.0;
   /// Shift of the root that is complete at the end of the movement.
   DVec3 root_shift_m = DVec3(0.0);
@@ -71,14 +73,15 @@ struct FootResidual {
   double over_s = 0.2;  ///< Time after which the residual is zero.
 };
 
-/// Horizontal motion of the root that is added so that it approaches its planned place above the
-/// standing feet over `over_s`. The rotations of the legs would take it there while the difference
-/// pose fades out, which is too abrupt if the place is far away or if the root moves at another
-/// speed.
+/// Additional horizontal motion of the root, which approaches its planned place above the standing
+/// feet over `over_s`. Without it, the rotations of the legs would move the root there while the
+/// difference pose fades out. This is too abrupt if the place is far away or if the root moves at
+/// another speed.
 struct RootApproach {
-  DVec3 offset_m = DVec3(0.0);    ///< Displacement of the root by the rotations of the legs.
+  DVec3 offset_m = DVec3(0.0);    ///< Displacement of the root due to the rotations of the legs.
   DVec3 offset_m_s = DVec3(0.0);  ///< Velocity of this displacement at the start of the movement.
-  double over_s = 0.0;            ///< If less than Movement::ease_out_s, nothing is added.
+  /// Duration. If it is less than Movement::ease_out_s, there is no additional motion.
+  double over_s = 0.0;
 };
 
 /// A foot plan in the layout that the planting kernels read: groups of four floats, with positions
@@ -88,30 +91,32 @@ inline constexpr std::size_t kPackedTrajectoryFloats = 60;
 inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 20;
 using PackedFootPlan = std::array<float, kPackedPlanFloats>;
 
-/// The plan for both feet of a movement. Together with the blended pose and the time it determines
-/// everything about foot planting.
+/// The plan for both feet of a movement. Together with the blended pose and the time, it determines
+/// the planted pose.
 struct FootPlan {
   bool is_active = false;
-  /// If the previously displayed pose had no planted feet, the changes due to planting (soles come
-  /// out of the ground, the root is lowered so that legs can bend) fade in over this time.
+  /// If the previously displayed pose had no planted feet, the changes due to planting fade in over
+  /// this time: soles are lifted out of the ground, and the root is lowered so that legs can bend.
   double plant_fade_s = 0.0;
-  PackedFootPlan packed{};  ///< All of the plan except `missed`; set when the plan is complete.
+  /// All of the plan except `missed_m` and `missed_rad`. Set when the plan is complete.
+  PackedFootPlan packed{};
 
   std::array<FootTrajectory, 2> feet;     ///< [foot]
   std::array<FootResidual, 2> residuals;  ///< [foot]
-  /// Residual of the root. It is separate, because the root may have followed the other foot
-  /// before.
+  /// Residual of the root. It is separate from those of the feet, because the root may have
+  /// followed the other foot before.
   DVec3 root_residual_m = DVec3(0.0);
   DVec3 root_residual_m_s = DVec3(0.0);
   RootApproach root_approach;
-  /// On terrain, soles are lifted out of the ground that they leave and land on. On level ground
-  /// the blend keeps them out well enough, and knees move less without the lift.
+  /// True on terrain: soles are lifted out of the ground that they leave and land on. On level
+  /// ground, soles in the blend are close enough to the ground, and without the lift knees move
+  /// less.
   bool keeps_above_ground = false;
-  /// Displayed pose minus planted pose when the plant fade began.
+  /// Root of the displayed pose minus that of the planted pose when the plant fade began.
   Vec3 plant_fade_root_m = Vec3(0.0f);
   std::array<std::array<Quat, 3>, 2>
-      /// [foot]: displayed minus planted rotations of hip, knee and ankle when the plant fade
-      /// began.
+      /// [foot]: rotations of hip, knee and ankle from the planted to the displayed pose when the
+      /// plant fade began.
       plant_fade_rotations{};
   DVec3 missed_m = DVec3(0.0);  ///< Horizontal vector from the planned to the requested footprint.
   /// Difference between the headings of the planned and the requested footprint.

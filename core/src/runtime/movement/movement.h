@@ -16,7 +16,7 @@
 
 namespace stridewire {
 
-/// A movement may turn this much more or less than its examples.
+/// Maximum turn of a movement in addition to that of its examples, to either side.
 inline constexpr double kMaxExtraTurnRad = 0.3;
 
 /// Limits on the playback speed of a movement.
@@ -32,13 +32,13 @@ struct PoseVelocity {
 /// One synthesized movement. While it lasts, the displayed pose without layers follows from this
 /// value, its group and the time.
 struct Movement {
-  // The members that each pose needs come first, in few cache lines.
+  // The members that are read for each pose come first, in few cache lines.
   int group = -1;
   bool is_inertial = false;  ///< True if difference_velocity is set.
   BaseFrame base;
   /// Turn in addition to that of the examples, eased over the movement.
   double extra_turn_rad = 0.0;
-  /// Movement time at which it begins; above 0 if it continues a redirected swing.
+  /// Time in the movement at which it begins. Above 0 if it continues a redirected swing.
   double start_offset_s = 0.0;
   double ease_out_s = kEaseOutS;     ///< T = min(MotionGroup::ease_out_s, duration).
   double rate = 1.0;                 ///< Playback speed relative to the examples, > 0.
@@ -57,34 +57,34 @@ struct Movement {
 };
 
 /// Sets weights (Section 3), keytimes (Eq. (4)) and ease-out time of `movement` for a group,
-/// parameters [d] and a base frame. Sets no difference pose. The vectors of `movement` keep their
-/// memory.
+/// parameters [d] and a base frame. Does not set a difference pose. Reuses the memory of the
+/// vectors in `movement`.
 void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
                    const BaseFrame& base, std::span<double> weight_scratch, Movement& movement);
 
-/// The part of StartMovement that determines the first and last pose: group, weights and heading
-/// change.
+/// Sets only what determines the first and last pose: group, weights and heading change. This is a
+/// part of StartMovement.
 void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
                 std::span<double> weight_scratch, Movement& movement);
 
 /// Replaces the weights [n] of a movement, and sets the heading change that follows from them.
 void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement);
 
-/// Completes StartMovement for a movement whose group, parameters and weights are set. `rate`
-/// divides all keytimes, so that every time of the movement is in seconds of the avatar.
+/// Performs the rest of StartMovement for a movement whose group, parameters and weights are set.
+/// `rate` divides all keytimes, so that all times of the movement are in seconds of the avatar.
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement,
                    double rate = 1.0);
 
 /// f(s) = 3(1-s)^2 - 2(1-s)^3: 1 for s <= 0, 0 for s >= 1.
 [[nodiscard]] double EaseOut(double s);
 
-/// h(s) = s (1-s)^2: zero at both ends, with slope 1 at 0. Together with f it forms the cubic
-/// through any value and slope at 0 that ends at rest.
+/// h(s) = s (1-s)^2: zero at both ends, with slope 1 at 0. Together with f it forms the cubic that
+/// has any given value and slope at 0 and ends at rest.
 [[nodiscard]] double EaseOutSlope(double s);
 
 /// Returns the base frame after the movement: below the displayed root at its end, with the heading
-/// turned by the blended change. The paper uses the displayed heading instead, which swings with
-/// the pelvis and lets walks drift.
+/// turned by the blended change. The paper uses the displayed heading instead. It oscillates with
+/// the pelvis, so walks would drift.
 [[nodiscard]] BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose);
 
 }  // namespace stridewire

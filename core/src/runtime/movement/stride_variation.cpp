@@ -5,7 +5,7 @@
 namespace stridewire {
 namespace {
 
-// Returns the number in [-1, 1) that corresponds to scrambled bits.
+// Maps random bits to a number in [-1, 1).
 double SignedFractionOf(std::uint64_t bits) { return 2.0 * FractionOf(bits) - 1.0; }
 
 }  // namespace

@@ -6,22 +6,22 @@
 namespace stridewire {
 
 /// Random deviations of one step from the planned one, so that an avatar does not repeat equal
-/// steps exactly. They depend on the seed of the avatar and on the number of the movement only.
+/// steps exactly. They depend only on the seed of the avatar and on the number of the movement.
 class StrideVariation {
  public:
-  /// Largest deviation of RateFactor() from 1.
+  /// Maximum deviation of RateFactor() from 1.
   static constexpr double kMaxRateChange = 0.036;
 
-  /// `movement_number` is the number of the movement in the life of the avatar.
+  /// `movement_number` counts the movements of the avatar.
   StrideVariation(std::uint64_t seed, std::uint64_t movement_number);
 
-  /// Returns the factor for the playback speed of the step. Half of its deviation is drawn for this
-  /// step and half for the previous one, because successive strides of people are correlated
-  /// (Hausdorff et al. 1995). Stride times, over two steps, then vary by 1.3 %, as those of young
-  /// adults do (Hausdorff et al. 1996; decision 0041).
+  /// Returns the factor for the playback speed of the step. Half of its deviation is random for
+  /// this step, and the other half is that of the previous step, because successive strides of
+  /// people are correlated (Hausdorff et al. 1995). Stride times, over two steps, then vary by 1.3
+  /// %, as those of young adults do (Hausdorff et al. 1996; decision 0041).
   [[nodiscard]] double RateFactor() const;
 
-  /// Returns a number in [-1, 1) for an example. These numbers are the direction in which the
+  /// Returns a number in [-1, 1) for an example. These numbers form the direction in which the
   /// weights of the step deviate.
   [[nodiscard]] double WeightDirection(std::size_t example) const;
 

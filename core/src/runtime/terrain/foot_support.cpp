@@ -16,8 +16,8 @@ constexpr int kToeRows = 3;
 constexpr int kRows = kHeelRows + 1 + kToeRows;
 constexpr int kColumns = 5;
 constexpr int kBallColumn = kColumns / 2;
-// Neighbouring points belong to the same ground if their heights differ by at most kMaxSlope (45
-// degrees) times their distance plus kForgivenM.
+// Two neighbouring points belong to the same ground if the difference of their heights is at most
+// their distance times kMaxSlope (45 degrees), plus kForgivenM.
 constexpr double kMaxSlope = 1.0;
 constexpr double kForgivenM = 0.005;
 
@@ -38,8 +38,8 @@ class SolePoints {
   [[nodiscard]] auto end() const { return points_.end(); }
   [[nodiscard]] static constexpr double size() { return kRows * kColumns; }
 
-  // Marks the points that are connected to the ball by slopes within the limit. Sweeps over all
-  // points until nothing changes: twice on ordinary ground, at most once per point.
+  // Marks the points that are connected to the ball by slopes within the limit. Passes over all
+  // points until nothing changes: twice on ordinary ground, and at most once per point.
   void Spread() {
     ball().is_reached = true;
     for (bool is_changed = true; is_changed;) {
@@ -75,8 +75,8 @@ struct Plane {
   int count = 0;  // Number of points that the plane was fitted to.
 };
 
-// Least-squares fit to the reached points. Subtracting their mean first makes level ground give an
-// exactly level plane.
+// Fits a plane to the marked points by least squares. Their mean is subtracted first, so that level
+// ground gives an exactly level plane.
 Plane FitPlane(const SolePoints& points, double ball_height) {
   Plane plane;
   double mean_side = 0.0;
@@ -113,7 +113,7 @@ Plane FitPlane(const SolePoints& points, double ball_height) {
     plane.side_slope = (sh * ff - fh * sf) / determinant;
     plane.forward_slope = (fh * ss - sh * sf) / determinant;
   } else if (ss + ff > 0.0) {
-    // All points are on one line: use the slope along it and none across.
+    // If all points are on one line, use the slope along it and none across.
     const bool is_along = ff >= ss;
     (is_along ? plane.forward_slope : plane.side_slope) = is_along ? fh / ff : sh / ss;
   }

@@ -18,20 +18,20 @@ struct FootSupport {
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Normal of the best-fitting plane; unit, y > 0.
   double plane_height_m = 0.0;           ///< Height of that plane at the ball.
   double ground_height_m = 0.0;          ///< Terrain::HeightAt the ball.
-  double gap_m = 0.0;    ///< Largest depth of the ground below the plane within the sole, >= 0.
-  double rise_m = 0.0;   ///< Largest height of the ground above the plane within the sole, >= 0.
-  double carried = 1.0;  ///< Fraction of the sole, 0 to 1, above the ground that the plane fits.
+  double gap_m = 0.0;    ///< Maximum depth of the ground below the plane within the sole, >= 0.
+  double rise_m = 0.0;   ///< Maximum height of the ground above the plane within the sole, >= 0.
+  double carried = 1.0;  ///< Fraction of the sole, 0 to 1, that is above ground close to the plane.
 };
 
 /// Computes the support of a foot whose ball is above (x, z) and whose heading is `heading_rad`.
-/// The sole is sampled at 10 x 5 points, including its corners and the ball. The plane is fitted
-/// (least squares) to the points that are connected to the ball without a rise or drop steeper than
-/// 45 degrees; 5 mm are tolerated. So at an edge the plane stays on the ball's side:
+/// The sole is sampled at 10 x 5 points, including its corners and the ball. The plane is fitted by
+/// least squares to the points that are connected to the ball without a rise or drop steeper than
+/// 45 degrees, with a tolerance of 5 mm. At an edge, the plane therefore stays on the ball's side:
 ///
-///            ball                 gap_m: the edge
-///     =========o==------          carried: 0.7 of the sole
-///     ~~~~~~~~~~~~|
-///                 |_________
+///          ball                 gap_m: the edge
+///   =========o==------          carried: 0.7 of the sole
+///   ~~~~~~~~~~~~|
+///               |_________
 ///
 /// On a slope, gap and rise are 0; on bumps both are small. All arguments must be finite. Never
 /// allocates.

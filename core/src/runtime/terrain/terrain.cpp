@@ -11,11 +11,11 @@
 namespace stridewire {
 namespace {
 
-// The grid index starts with about as many cells as there are boxes. It is refined while a cell
-// holds more than kFewBoxes.
+// The grid index starts with about one cell per box. It is refined as long as a cell contains more
+// than kFewBoxes boxes.
 constexpr std::int32_t kMaxIndexCellsPerAxis = 1024;
 constexpr std::size_t kFewBoxes = 16;
-// Smallest extent of the indexed area. It prevents cells of size zero.
+// Minimum extent of the indexed area. It prevents cells of size zero.
 constexpr double kMinIndexedM = 1e-6;
 constexpr std::size_t kMaxIndexEntries = std::size_t{4} << 20;
 
@@ -124,8 +124,8 @@ Status Terrain::IndexBoxes() {
     bounds_.min = {std::min(bounds_.min.x, box.min_m.x), std::min(bounds_.min.z, box.min_m.z)};
     bounds_.max = {std::max(bounds_.max.x, box.max_m.x), std::max(bounds_.max.z, box.max_m.z)};
   }
-  // Start with nearly square cells, one per box on average. Halve them while the fullest cell gets
-  // emptier.
+  // Starts with nearly square cells, one per box on average. Halves them as long as this reduces
+  // the number of boxes in the fullest cell.
   const double width = std::max(bounds_.max.x - bounds_.min.x, kMinIndexedM);
   const double depth = std::max(bounds_.max.z - bounds_.min.z, kMinIndexedM);
   double cell = std::sqrt(width * depth / static_cast<double>(data_.boxes.size()));
@@ -134,9 +134,9 @@ Status Terrain::IndexBoxes() {
     const auto cells_x = 1 + CellOf(width / cell, kMaxIndexCellsPerAxis);
     const auto cells_z = 1 + CellOf(depth / cell, kMaxIndexCellsPerAxis);
     if (!TryIndex(cells_x, cells_z)) {
-      if (!starts_.empty()) break;  // Keep the previous, coarser index.
-      // A mixture of large and many small boxes needs too many entries. Coarser cells need fewer,
-      // and a single cell always fits.
+      if (!starts_.empty()) break;  // Keeps the previous, coarser index.
+      // A mixture of large and many small boxes would need too many entries. Coarser cells need
+      // fewer, and a single cell always fits.
       is_coarser_needed = true;
       cell *= 2.0;
       continue;
@@ -186,7 +186,7 @@ bool Terrain::TryIndex(std::int32_t cells_x, std::int32_t cells_z) {
   }
   std::partial_sum(starts.begin(), starts.end(), starts.begin());
 
-  // Insert the boxes in the order of their heights, so that each cell lists its highest box first.
+  // Inserts the boxes in the order of their heights, so that each cell lists its highest box first.
   std::vector<std::uint32_t> order(data_.boxes.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
@@ -209,7 +209,8 @@ bool Terrain::TryIndex(std::int32_t cells_x, std::int32_t cells_z) {
 }
 
 Terrain::CellRange Terrain::IndexCells(const Rectangle& area) const {
-  // The index is monotonic in the coordinate, so a box and a point inside it always share a cell.
+  // The index is monotonic in the coordinate, so a box and a point inside it always have a cell in
+  // common.
   return {CellOf((area.min.x - bounds_.min.x) * cells_per_m_x_, cells_x_),
           CellOf((area.max.x - bounds_.min.x) * cells_per_m_x_, cells_x_),
           CellOf((area.min.z - bounds_.min.z) * cells_per_m_z_, cells_z_),
@@ -228,7 +229,7 @@ void Terrain::VisitBoxes(const Rectangle& area, Visit&& visit) const {
       const auto cell = CellIndex(i, j, cells_x_);
       for (std::uint32_t e = starts_[cell]; e < starts_[cell + 1]; ++e) {
         const TerrainBox& box = data_.boxes[boxes_[e]];
-        // Visit a box that spans several cells only in the first of them that is in `range`.
+        // A box that spans several cells is visited only in the first of them that is in `range`.
         const CellRange own = IndexCells({box.min_m, box.max_m});
         if (std::max(own.first_x, range.first_x) == i &&
             std::max(own.first_z, range.first_z) == j) {
@@ -281,10 +282,10 @@ double Terrain::FieldHeight(double x, double z) const {
   return near * (1.0 - p.t) + far * p.t;
 }
 
-// `area` must be inside the field. Over an axis-parallel rectangle, a bilinear patch is highest at
-// a corner of that rectangle. So it suffices to sample the corners of the part of `area` in each
-// cell, that is, the points of the grid formed by the area's borders and the sample lines between
-// them.
+// `area` must be inside the field. A bilinear patch has its maximum over an axis-parallel rectangle
+// at a corner of that rectangle. It is therefore sufficient to sample the corners of the part of
+// `area` in each cell. These are the points of the grid that consists of the borders of `area` and
+// the sample lines between them.
 double Terrain::HighestInField(const Rectangle& area) const {
   const HeightField& field = *data_.height_field;
   const auto line = [&](double origin, std::int32_t l) { return origin + field.cell_m * l; };

@@ -12,32 +12,33 @@ namespace stridewire {
 namespace {
 
 constexpr std::size_t kMaxRows = kMaxParameters + 1;  // Rows of [J; 1].
-// Error per parameter in metres; a radian counts as kMetresPerRadian.
+// Error per parameter in metres. A radian counts as kMetresPerRadian.
 using Vector = std::array<double, kMaxRows>;
 using Matrix = std::array<Vector, kMaxRows>;
 
-// Every example may change by at least this fraction of the mean |w|.
+// The scale of the change of each example is at least this fraction of the mean |w|.
 constexpr double kMinUsage = 0.5;
-// Weights start to shrink this far below the largest permitted sum of |w|.
+// Weights start to shrink when the sum of |w| is this far below its maximum.
 constexpr double kMargin = 0.1;
-// At errors below this, weights shrink less. Then they are a smooth function of the request.
+// At errors below this, weights shrink less, so that they are a smooth function of the request.
 constexpr double kShrinkErrorM = 1e-4;
 // Ridge added to the diagonal, relative to the trace. It handles directions that no example spans.
 constexpr double kRidge = 1e-9;
 constexpr int kMaxHalvings = 3;
-// Only the poses of groups with at most this many parameters vary, which are straight steps. Other
-// steps are rarely repeated, and their examples differ so much that soles would enter the ground.
+// Poses vary only in groups with at most this many parameters, that is, in straight steps. Other
+// steps are rarely repeated. Their examples differ so much that soles would enter the ground.
 constexpr std::size_t kMaxVariedParameters = 2;
-// Size of a variation as measured by PoseChange, in radians. Larger ones push the toes of `builtin`
-// into the ground.
+// Size of a variation in radians, as measured by PoseChange. Larger variations push the toes of
+// `builtin` into the ground.
 constexpr double kVariedRad = 0.04;
 // Fractions of a step at which the pose is measured.
 constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
-// Largest change of a weight relative to its value, before the effect on the parameters is removed.
+// Maximum change of a weight relative to its value, before the effect on the parameters is removed.
 constexpr double kMaxRelativeChange = 3.0;
-// Groups with fewer captured examples per coefficient of the linear part have few examples.
+// A group has few examples if it has fewer captured examples than this per coefficient of the
+// linear part.
 constexpr int kExamplesPerCoefficient = 4;
-// A variation is given up if it leaves an error above this.
+// A variation is not used if it leaves an error above this.
 constexpr double kMaxVariedErrorM = 1e-4;
 
 double Sum(std::span<const double> values) {
@@ -52,8 +53,8 @@ double SumOfMagnitudes(std::span<const double> values) {
   return sum;
 }
 
-// Scales negative weights, and the others so that the sum remains 1, until the sum of |w| is at
-// most `max_sum`.
+// Scales down negative weights until the sum of |w| is at most `max_sum`. Scales the others so that
+// the sum remains 1.
 void LimitNegativeWeights(double max_sum, std::span<double> weights) {
   double negative = 0.0;
   for (const double weight : weights) negative -= std::min(weight, 0.0);
@@ -93,10 +94,10 @@ void SolveFactored(const Matrix& factor, std::size_t rows, Vector& right) {
   }
 }
 
-// Solves for one Gauss-Newton step of the weights (see CorrectWeights).
+// Solves for the change of the weights in one Gauss-Newton iteration (see CorrectWeights).
 class WeightStep {
  public:
-  // The argument `slopes` is J, [d][n], in metres.
+  // `slopes` is J, [d][n], in metres.
   WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d)
       : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1) {
     min_usage_ = kMinUsage * SumOfMagnitudes(weights) / static_cast<double>(n_);
@@ -134,7 +135,7 @@ class WeightStep {
   }
 
   // Writes the change of the weights [n] in the direction of `variation`, without the part that
-  // affects the parameters or the sum.
+  // changes the parameters or the sum.
   void Vary(const StrideVariation& variation, std::span<double> change) const {
     for (std::size_t e = 0; e < n_; ++e) change[e] = variation.WeightDirection(e) * weights_[e];
     Vector y{};
@@ -152,7 +153,7 @@ class WeightStep {
     for (std::size_t a = 0; a < rows_; ++a) sum += At(a, e) * y[a];
     return sum;
   }
-  // Corrects the sum, which the ridge changes.
+  // Restores the sum of the weights, which the ridge changes.
   void SetSum(double sum, std::span<double> out) const {
     const double left = (sum - Sum(out)) / total_usage_;
     for (std::size_t e = 0; e < n_; ++e) out[e] += left * Usage(e);
@@ -191,8 +192,8 @@ double PoseChange(const MotionGroup& group, const GridLayout& layout,
   return std::sqrt(squares / static_cast<double>(kVariedAt.size()));
 }
 
-// Adds a change to the weights [n]. `size_rad` is its size as measured by PoseChange. Scales the
-// change to kVariedRad, as far as the limits on weights allow.
+// Adds a change to the weights [n]. `size_rad` is its size as measured by PoseChange. The change is
+// scaled to kVariedRad, or less if the limits on weights require it.
 void AddVariation(std::span<const double> change, double size_rad, double max_sum,
                   std::span<double> weights) {
   constexpr double kTiny = 1e-9;
@@ -302,8 +303,9 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
     if (size > max_sum - kMargin) {
       step.Solve(best.missing, 1.0, halved);
       const double least = SumOfMagnitudes(halved);
-      // The new weights depend linearly on the amount of shrinking, and the sum of |w| is convex in
-      // it. Linear interpolation between no and full shrinking thus gives a sufficient amount.
+      // The new weights depend linearly on the amount of shrinking, and the sum of |w| is a convex
+      // function of it. Linear interpolation between no and full shrinking thus gives a sufficient
+      // amount.
       const double shrinking = least < size
                                    ? std::min((size - max_sum + kMargin) / (size - least), 1.0) *
                                          best.largest_m / (best.largest_m + kShrinkErrorM)

@@ -20,7 +20,7 @@ inline constexpr double kMaxCorrectedWeightSum = 2.5;
 /// Conditions under which a correction stops, and limits on the resulting weights.
 struct CorrectionLimits {
   int max_iterations = 3;
-  double tolerance_m = 1e-5;  ///< Stop when the error is at most this.
+  double tolerance_m = 1e-5;  ///< Iterations stop when the error is at most this.
   /// Negative weights are scaled until the sum of |w| before the correction is at most this.
   double start_weight_sum = HUGE_VAL;
   double weight_sum = kMaxCorrectedWeightSum;  ///< Limit on the sum of |w| after correction.
@@ -42,13 +42,13 @@ inline constexpr double kSparseWeightSum = 1.4;
 
 /// Result of a correction.
 struct Correction {
-  /// Error with correction: |p^ - a| as in LargestDifference; <= initial_error_m
+  /// Error after correction: |p^ - a| as in LargestDifference; <= initial_error_m.
   double error_m = 0.0;
-  double initial_error_m = 0.0;  ///< Error without correction: e(p^) = |p^ - a(p^)|
+  double initial_error_m = 0.0;  ///< Error without correction: e(p^) = |p^ - a(p^)|.
   int iterations = 0;
 };
 
-/// Memory for CorrectWeights, allocated once and used for any number of corrections. One per
+/// Memory for CorrectWeights, which is allocated once and used for all corrections. Use one per
 /// thread.
 class CorrectionScratch {
  public:
@@ -57,8 +57,8 @@ class CorrectionScratch {
   /// Allocates memory for all groups of a library, which must outlive the scratch.
   explicit CorrectionScratch(const MotionLibrary& library);
 
-  /// Returns room for the weights of a group in double precision. It contains the result of
-  /// CorrectWeights.
+  /// Returns memory for the weights of a group in double precision. CorrectWeights writes its
+  /// result there.
   [[nodiscard]] std::span<double> weights(const MotionGroup& group) {
     return std::span(weights_).first(static_cast<std::size_t>(group.example_count));
   }
@@ -76,30 +76,30 @@ class CorrectionScratch {
   std::vector<double> slopes_;   // [parameter][example]
 };
 
-/// Sets the parameters and weights of a movement so that the movement really has the parameters p^
-/// given by `wanted` (paper, Section 4; the paper searches for p* with a(p*) = p^ instead).
-/// Performs Gauss-Newton iterations on the weights:
+/// Sets the parameters and weights of a movement so that its measured parameters are p^, given by
+/// `wanted` (paper, Section 4; the paper searches for p* with a(p*) = p^ instead). Performs
+/// Gauss-Newton iterations on the weights:
 ///
 ///   w <- w + D J^T y,   [J; 1] D [J; 1]^T y = [p^ - a(w); 0],   J = a'(w) [d][n],
 ///   D = diag(|w| + half of its mean)
 ///
-/// Of all changes that correct the parameters to first order, this is the smallest relative to how
-/// much each example is used. a(w) and J depend only on the first and the last pose.
+/// Of all changes that correct the parameters to first order, this is the smallest one relative to
+/// the weights of the examples. a(w) and J depend only on the first and the last pose.
 ///
-/// If the sum of |w| exceeds `limits.start_weight_sum`, negative weights are scaled first.
-///
-/// If the sum of |w| would come within 0.1 of its limit, the part of w that does not affect the
-/// parameters shrinks as far as necessary. A step that increases the error or makes the weights too
-/// large is halved up to three times. The best w is kept, so the result is never worse than without
-/// correction. An error remains if no weights within the limit reach p^.
+/// If the sum of |w| exceeds `limits.start_weight_sum`, negative weights are scaled down first. If
+/// the sum of |w| would come within 0.1 of its limit, the part of w that does not affect the
+/// parameters shrinks by the required amount. If an iteration increases the error or makes the
+/// weights too large, its change is halved up to three times. The best w is kept, so the result is
+/// never worse than without correction. An error remains if no weights within the limit reach p^.
 ///
 /// With `variation`, the weights of groups with one or two parameters deviate before they are
 /// corrected. The part of the deviation that changes the parameters is removed to first order, with
-/// D as above. The rest is scaled to a fixed change of the pose. If the correction cannot reach p^
-/// from there, it is repeated without variation.
+/// D as above. The rest is scaled to a fixed change of the pose. If the correction then cannot
+/// reach p^, it is repeated without variation.
 ///
-/// Sets movement.group to -1; a caller whose group is part of a library sets the index afterwards.
-/// Does not allocate if `movement.weights` has room for the group. Same bytes on every machine.
+/// Sets movement.group to -1. If the group is part of a library, the caller must set the index
+/// afterwards. Does not allocate if `movement.weights` has room for the group. Gives the same bytes
+/// on every machine.
 Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
                           const CorrectionLimits& limits, CorrectionScratch& scratch,
                           Movement& movement,

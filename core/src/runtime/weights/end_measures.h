@@ -11,12 +11,12 @@ struct EndMeasures {
   DVec3 start_m = DVec3(0.0);
   /// Vector from the fixed foot to the moving foot in the last pose, in its heading frame.
   DVec3 end_m = DVec3(0.0);
-  /// Displacement of the centre between the balls, in the heading frame of the first pose.
+  /// Displacement of the midpoint between the balls, in the heading frame of the first pose.
   DVec3 travel_m = DVec3(0.0);
   double heading_change_rad = 0.0;
 };
 
-/// Returns one parameter of a movement with these ends.
+/// Returns one parameter of a movement with these measurements.
 [[nodiscard]] inline double ParameterOf(const EndMeasures& ends, ParameterName name) {
   switch (name) {
     case ParameterName::kStartX: return ends.start_m.x;

@@ -18,7 +18,7 @@ DVec3 Turn(double sine, double cosine, const DVec3& v) {
 
 void EndPoses::Gradient::Add(int joint, const DVec3& by_xyz, double by_w) {
   const auto j = static_cast<std::size_t>(joint);
-  // The chains of the two legs share their first joints, so look for an existing entry.
+  // The chains of the two legs share their first joints, so an entry may already exist.
   std::size_t i = 0;
   while (i < joint_count_ && joints_[i].joint != j) ++i;
   if (i == joint_count_) joints_[joint_count_++] = {j, {}};
@@ -31,7 +31,7 @@ void EndPoses::Gradient::Add(int joint, const DVec3& by_xyz, double by_w) {
 
 void EndPoses::Gradient::AddTo(const float* rows, std::size_t row_floats,
                                std::span<double> slopes) const {
-  // Lets the compiler assume that writing a slope changes none of the parts.
+  // __restrict lets the compiler assume that writing a slope changes none of the parts.
   const Parts* __restrict parts = joints_.data();
   double* __restrict slope = slopes.data();
   const std::size_t count = joint_count_;
@@ -95,7 +95,7 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
       DQuat blended(GridLayout::RotationOf(sum.data(), j));
       double norm = std::sqrt(glm::dot(blended, blended));
       link.per_norm = 1.0 / norm;
-      // A sum of rotations that is too short has no direction; handled as in EvaluateBlend.
+      // A sum of rotations that is too short has no direction. It is handled as in EvaluateBlend.
       if (norm < kernels::kSmallestNorm) {
         const auto largest = static_cast<std::size_t>(
             std::max_element(movement.weights.begin(), movement.weights.end()) -
@@ -125,9 +125,9 @@ ParameterValues EndPoses::Measure() const {
 
 // Adds the derivative of the position of a foot's ball in the world direction `along`.
 //
-// Walks from the root to the ball. g is the direction in the axes of the parent of the current
-// joint. With the arm v (the vector from the joint to the ball) and the joint's rotation q = (u,
-// w), the rotated arm is
+// The loop runs from the root to the ball. g is the direction in the axes of the parent of the
+// current joint. With the arm v (the vector from the joint to the ball) and the joint's rotation q
+// = (u, w), the rotated arm is
 //
 //   R(q) v = (w w - u u) v + 2 (u v) u + 2 w (u x v)
 //

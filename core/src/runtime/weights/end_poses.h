@@ -11,15 +11,15 @@
 namespace stridewire {
 
 /// Computes the parameters of a blend from its first and last pose, and their derivatives with
-/// respect to the weights. That is all that weight correction needs. It evaluates only the chains
-/// of joints from the root to the balls of the feet, with the base frame at the origin. Allocates
-/// in its constructor only. Same bytes on every machine.
+/// respect to the weights, for weight correction. Evaluates only the chains of joints from the root
+/// to the balls of the feet, with the base frame at the origin. Allocates only in its constructor.
+/// Gives the same bytes on every machine.
 class EndPoses {
  public:
   /// Borrows `skeleton`.
   EndPoses(const Skeleton& skeleton, const GridLayout& layout);
 
-  /// Chooses the group to measure. Borrows it until the next call.
+  /// Selects the group to measure. Borrows it until the next call.
   void SetGroup(const MotionGroup& group);
 
   [[nodiscard]] const GridLayout& layout() const { return layout_; }
@@ -31,8 +31,8 @@ class EndPoses {
   [[nodiscard]] ParameterValues Measure() const;
 
   /// Writes J = a'(w), the derivatives of the parameters with respect to each weight at the last
-  /// blend, to `slopes` [d][n], in metres or radians. Individual derivatives also change the sum of
-  /// the weights, so only combinations that keep the sum are meaningful.
+  /// blend, to `slopes` [d][n], in metres or radians. A change of a single weight also changes the
+  /// sum of the weights, so only combinations that keep the sum are meaningful.
   void MeasureSlopes(std::span<double> slopes);
 
  private:
@@ -43,7 +43,7 @@ class EndPoses {
     // of a single example.
     double per_norm;
     DVec3 arm;   // Vector from the joint to the ball, in the joint's axes.
-    DVec3 ball;  // The same vector in the axes of the parent.
+    DVec3 ball;  // Vector from the joint to the ball, in the axes of the parent.
   };
   struct End {
     std::array<std::vector<Link>, 2> links;  // [foot]: links in the order of chains_.
@@ -83,7 +83,7 @@ class EndPoses {
   const MotionGroup* group_ = nullptr;
   // [foot]: joints from the joint of the ball to the root.
   std::array<std::vector<int>, 2> chains_;
-  double sign_ = 1.0;  // +1 if "left minus right" is "moving minus fixed", else -1.
+  double sign_ = 1.0;  // +1 if "left minus right" is "moving minus fixed", and -1 otherwise.
   double heading_change_rad_ = 0.0;
   double sine_ = 0.0;  // Sine and cosine of heading_change_rad_.
   double cosine_ = 1.0;

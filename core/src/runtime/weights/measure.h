@@ -8,11 +8,11 @@
 
 namespace stridewire {
 
-/// a(p): the actual parameters of a movement, measured on the first and last pose of the blend
-/// (paper, Section 4), in the order of its group. For steps these are the foot vectors in the
-/// heading frames of start and end, and the heading change. For jumps they are the forward and
-/// upward displacement of the centre between the balls. `pose` is scratch space with one rotation
-/// per joint. Never allocates.
+/// Returns a(p): the actual parameters of a movement, measured on the first and last pose of the
+/// blend (paper, Section 4), in the order of its group. For steps, these are the foot vectors in
+/// the heading frames of start and end, and the heading change. For jumps, they are the forward and
+/// upward displacement of the midpoint between the balls. `pose` is scratch memory with one
+/// rotation per joint. Never allocates.
 [[nodiscard]] ParameterValues MeasureMovement(const MotionLibrary& library,
                                               const Movement& movement, GridCache& cache,
                                               PoseSpan pose);
@@ -22,13 +22,13 @@ namespace stridewire {
                                               const MotionGroup& group, const Movement& movement,
                                               GridCache& cache, PoseSpan pose);
 
-/// Returns the largest difference between two parameter vectors of a group, in metres; a radian
+/// Returns the largest difference between two parameter vectors of a group, in metres. A radian
 /// counts as kMetresPerRadian. This is the norm of the paper's interpolation error e(p) = |p -
 /// a(p)|.
 [[nodiscard]] double LargestDifference(const MotionGroup& group, const ParameterValues& a,
                                        const ParameterValues& b);
 
-/// Converts angles to metres wherever parameters of both kinds are compared.
+/// Converts angles to metres where parameters of both kinds are compared.
 inline constexpr double kMetresPerRadian = 0.5;
 
 }  // namespace stridewire
