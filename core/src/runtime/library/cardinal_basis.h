@@ -36,7 +36,7 @@ struct ConstBasisSpan {
   std::span<const double> centres, scales, sites, dilations, linear, radial;
 };
 
-/// Least distance between two sites after scaling. Callers must merge sites that are closer.
+/// Minimum distance between two sites after scaling. Callers must merge closer sites.
 inline constexpr double kMinSiteDistance = 1e-4;
 /// Run fails if the condition number of R is larger.
 inline constexpr double kMaxCondition = 1e6;
@@ -47,31 +47,31 @@ struct CardinalBasisFit {
   int example_count = 0;
   /// [site][d]: parameters of the examples, followed by those of the pseudoexamples.
   std::span<const double> sites;
-  std::span<const double> pseudo_weights;  ///< [site - n][n]: weights of the pseudoexamples
+  std::span<const double> pseudo_weights;  ///< [site - n][n]: weights of the pseudoexamples.
   std::span<const double> scales;          ///< [d], > 0
   /// [site]: factors by which the dilations are multiplied, > 0. Empty: all factors are 1.
   std::span<const double> radius_factors;
-  /// If true, every dilation is the distance to the nearest other site of either sort, as in the
-  /// paper.
+  /// True: every dilation is the distance to the nearest other site, whether example or
+  /// pseudoexample, as in the paper.
   bool radii_from_all_sites = false;
 
   /// Fits the basis.
   ///
-  /// The centre of a parameter is its mean over the *examples*. If the examples do not span all
-  /// parameters, the weights sum to 1 away from the sites only if parameters are centred.
-  /// The dilation of an example is the distance to the nearest other example, that of a
-  /// pseudoexample the distance to the nearest site. Otherwise refinement, which adds
-  /// pseudoexamples, would shrink every radius. The least-squares solution has minimum norm;
-  /// directions with a relative weight below 1e-9 are ignored.
+  /// The centre of a parameter is its mean over the *examples*. Parameters are centred so that the
+  /// weights sum to 1 away from the sites even if the examples do not span all parameters. The
+  /// dilation of an example is the distance to the nearest other example, that of a pseudoexample
+  /// the distance to the nearest site. Otherwise refinement, which adds pseudoexamples, would
+  /// shrink every radius. The least-squares solution has minimum norm; directions with a relative
+  /// weight below 1e-9 are ignored.
   ///
-  /// kShapeMismatch: the spans do not fit each other. kOutOfRange: a number is not finite or not
-  /// positive. kIllConditioned: two sites are closer than kMinSiteDistance (index: the site), or
-  /// the condition number of R is above kMaxCondition.
+  /// Errors: kShapeMismatch if the sizes of the spans do not match. kOutOfRange if a number is not
+  /// finite or not positive. kIllConditioned if two sites are closer than kMinSiteDistance (index:
+  /// the site), or if the condition number of R is above kMaxCondition.
   [[nodiscard]] Expected<CardinalBasis> Run() const;
 };
 
-/// Condition number of R, with R_kj = B(|p_k - p_j| / d_j), estimated in the 1-norm. Returns
-/// HUGE_VAL if R is singular.
+/// Returns the condition number of R, with R_kj = B(|p_k - p_j| / d_j), estimated in the 1-norm.
+/// Returns HUGE_VAL if R is singular.
 [[nodiscard]] double RadialCondition(std::span<const double> sites,
                                      std::span<const double> dilations,
                                      std::span<const double> scales);

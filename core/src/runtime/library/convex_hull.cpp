@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::size_t kMaxCorral = kMaxParameters + 1;
 constexpr int kMaxRounds = 200;
-// Groups with more examples are rare.
+// Number of vertices that are stored. Larger groups are rare.
 constexpr std::size_t kMaxStoredVertices = 256;
 constexpr double kInside = 1e-9;
 
@@ -48,9 +48,9 @@ struct Corral {
   }
 };
 
-// Weights (of any sign, sum 1) of the point of smallest norm in the affine hull of the corral.
-// Solves (1 1^T + P P^T) v = 1 by Gaussian elimination with pivoting; the weights are v / sum v.
-// Returns false if the system is singular.
+// Computes the weights (of any sign, sum 1) of the point of smallest norm in the affine hull of the
+// corral. Solves (1 1^T + P P^T) v = 1 by Gaussian elimination with pivoting; the weights are v /
+// sum v. Returns false if the system is singular.
 bool AffineMinimum(const Corral& corral, std::size_t d, std::array<double, kMaxCorral>& weights) {
   const std::size_t n = corral.size;
   std::array<std::array<double, kMaxCorral + 1>, kMaxCorral> m{};
@@ -99,9 +99,9 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
   }
   Point mean{};
   for (std::size_t l = 0; l < d; ++l) mean[l] = sum[l] / static_cast<double>(count);
-  // Vertices relative to the target, multiplied by the metric. The first ones are stored; the
-  // others are computed whenever they are needed, so that large groups need no more stack than
-  // small ones.
+  // Vertices relative to the target, multiplied by the metric. The first ones are stored. The
+  // others are computed when they are needed, so that large groups need no more stack than small
+  // ones.
   const auto compute_vertex = [&](std::size_t i) {
     Point vertex{};
     for (std::size_t l = 0; l < d; ++l) {
@@ -141,7 +141,7 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
     const auto [candidate, least] =
         find_least([&](const Point& vertex) { return DotProduct(x, vertex, d); });
     if (least > norm - 1e-12 * std::max(1.0, norm)) break;  // No vertex is closer to the origin.
-    if (corral.size == d + 1) {  // The corral is full: remove the vertex of least weight.
+    if (corral.size == d + 1) {  // The corral is full: remove the vertex with the smallest weight.
       const auto smallest = std::min_element(
           corral.lambda.begin(), corral.lambda.begin() + static_cast<long>(corral.size));
       corral.Remove(static_cast<std::size_t>(smallest - corral.lambda.begin()));

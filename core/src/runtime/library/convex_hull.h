@@ -4,7 +4,7 @@
 
 namespace stridewire {
 
-/// Finds the point nearest to `target` [d] in the grown convex hull of `points` [count][d].
+/// Finds the point closest to `target` [d] in the enlarged convex hull of `points` [count][d].
 ///
 /// The hull is scaled about the mean of the points: a `growth` of 0.1 moves every point 10 %
 /// further from the mean. Distances are measured after multiplying parameter l by `metric[l]`.

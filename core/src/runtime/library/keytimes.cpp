@@ -88,8 +88,8 @@ TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cell
     length[i] = keytimes_s[i + 1] - keytimes_s[i];
     rate[i] = cells[i] / length[i];
   }
-  // Fritsch and Carlson: with the weighted harmonic mean of the neighbouring rates as slope, the
-  // cubic is monotone. All rates are positive here. The slopes at the ends use the one-sided
+  // Fritsch and Carlson: the cubic is monotone if its slopes are weighted harmonic means of the
+  // neighbouring rates. All rates are positive here. The slopes at the ends use the one-sided
   // three-point formula, clamped to [0, 3 rate], which guarantees monotonicity.
   if (n == 1) {
     knots_[0].slope = knots_[1].slope = rate[0];

@@ -8,12 +8,13 @@
 
 namespace stridewire {
 
-inline constexpr int kMaxIntervals = 8;  ///< Largest number of keytime intervals per movement.
-/// Loading a library fails if a keytime interval is shorter than this, in seconds.
+inline constexpr int kMaxIntervals = 8;  ///< Maximum number of keytime intervals per movement.
+/// Minimum length of a keytime interval in seconds. A library with a shorter interval is rejected.
 inline constexpr double kMinIntervalS = 1e-3;
 
-/// kOutOfRange: there are fewer than 2 or more than kMaxIntervals + 1 keytimes, the first is not 0,
-/// an interval is shorter than kMinIntervalS (index: the interval), or a number is not finite.
+/// Errors: kOutOfRange if there are fewer than 2 or more than kMaxIntervals + 1 keytimes, the first
+/// is not 0, an interval is shorter than kMinIntervalS (index: the interval), or a number is not
+/// finite.
 [[nodiscard]] Status ValidateKeytimes(std::span<const double> keytimes_s);
 
 /// Generic time, paper Eq. (3): g(t) = i + (t - K_i) / (K_{i+1} - K_i) for K_i <= t < K_{i+1}. t is
@@ -29,13 +30,14 @@ inline constexpr double kMinIntervalS = 1e-3;
 inline constexpr double kShortestInterval = 0.75;
 inline constexpr double kLongestInterval = 4.0 / 3.0;
 
-/// Blends keytimes, paper Eq. (4). Blends interval *lengths* and clamps each as above, because
-/// weights may be negative. Without the clamp, sum w K would not always increase outside the hull.
-/// Even inside the hull an interval could shrink much more than the motion in it, which then would
-/// be too fast: by 2.7 cm per 60 Hz frame for steps of 0.64 to 0.76 m of captured subject 16.
+/// Blends keytimes (paper, Eq. (4)). Blends the *lengths* of intervals and clamps each as above,
+/// because weights may be negative. Without the clamp, sum w K would not always increase outside
+/// the hull. Even inside the hull, an interval could shrink much more than the motion in it, which
+/// would then be too fast: by 2.7 cm per 60 Hz frame for steps of 0.64 to 0.76 m of captured
+/// subject 16.
 ///
 /// `example_keytimes_s` is [example][interval_count + 1] and `out_s` is [interval_count + 1]. The
-/// weights sum to 1. K_0 = 0.
+/// weights must sum to 1, and K_0 = 0.
 void BlendKeytimes(std::span<const double> example_keytimes_s, std::span<const float> weights,
                    std::span<double> out_s);
 

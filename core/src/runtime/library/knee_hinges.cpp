@@ -68,7 +68,7 @@ DVec3 HingeOfStand(const Skeleton& skeleton, ConstPoseSpan stand_pose, Foot foot
   return glm::conjugate(DQuat(rotations[static_cast<std::size_t>(leg.hip)])) * Unit(left);
 }
 
-// Learns the hinge of one knee from poses.
+// Computes the hinge of one knee from poses.
 class HingeLearner {
  public:
   HingeLearner(const Skeleton& skeleton, Foot foot)

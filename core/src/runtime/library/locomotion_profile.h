@@ -9,28 +9,29 @@ namespace stridewire {
 
 class MotionLibrary;
 
-/// Feet are apart if one is further ahead of the other than this, compared with the stand.
+/// Feet are apart if the forward distance between them exceeds that of the stand pose by more than
+/// this.
 inline constexpr double kFeetApartForwardM = 0.12;
 
-/// Typical steps of a library, derived from its examples. Walks use them unless the request says
-/// otherwise.
+/// Typical steps of a library, derived from its examples. Walks use them unless the request
+/// specifies other values.
 struct LocomotionProfile {
-  double step_m = 0.5;     ///< Comfortable step forward, from foot to foot.
-  double longest_m = 0.6;  ///< Longest step forward.
-  /// Shortest forward step that the library has for both feet, at most step_m. It is 0 if either
-  /// foot can step beside the other.
+  double step_m = 0.5;     ///< Comfortable length of a step forward, from foot to foot.
+  double longest_m = 0.6;  ///< Maximum length of a step forward.
+  /// Minimum length of a forward step with either foot, at most step_m. It is 0 if each foot can
+  /// step beside the other.
   double shortest_m = 0.0;
-  double back_m = 0.0;    ///< Longest comfortable step backward.
+  double back_m = 0.0;    ///< Maximum comfortable length of a step backward.
   double width_m = 0.15;  ///< Sideways distance between the feet in a straight walk.
   double stand_m = 0.2;   ///< Sideways distance between the feet in the stand pose.
   /// [foot]: position of the foot in the stand pose, relative to the base frame.
   std::array<DVec3, 2> stand_feet_m{};
-  /// True if the stand pose has one foot more than 0.12 m ahead of the other, because the captures
-  /// contain no stand. A walk then begins and ends in a stride.
+  /// True if one foot of the stand pose is more than 0.12 m ahead of the other, because the
+  /// captures contain no stand. A walk then begins and ends in a stride.
   bool stands_in_stride = false;
   bool has_climbs = false;  ///< True if a group of steps has the parameter end_y.
 
-  /// Returns the foot that stands behind in the stand pose.
+  /// Returns the rear foot of the stand pose.
   [[nodiscard]] Foot RearFoot() const {
     return stand_feet_m[0].z <= stand_feet_m[1].z ? Foot::kLeft : Foot::kRight;
   }

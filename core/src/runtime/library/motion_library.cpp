@@ -33,22 +33,24 @@ constexpr std::size_t kAlignment = 64;
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
-// The following limits are far beyond any human movement. Larger values would lose too much
-// precision in floats.
-// Largest absolute value of a parameter, in metres or radians.
+// The following limits are far beyond human movements. Larger values would lose too much precision
+// as floats.
+//
+// Maximum absolute value of a parameter, in metres or radians.
 constexpr double kMaxParameter = 100.0;
-// Largest distance of the root from the base frame, along each axis.
+// Maximum distance of the root from the base frame, along each axis.
 constexpr double kMaxRootM = 1000.0;
 constexpr double kMaxYawRad = 100.0;
 constexpr double kMaxMovementS = 600.0;
 constexpr double kMinScale = 1e-7;
 constexpr double kMaxRadiusFactor = 100.0;
 
-// The weights must stay bounded up to this far outside the range of each parameter, as a fraction
-// of that range. Requests are clamped to 10 % outside, so this leaves a margin.
+// The weights must stay bounded up to this distance outside the range of each parameter, as a
+// fraction of the range. Requests are clamped to 10 % outside, so there is a margin.
 constexpr double kReach = 0.5;
-// Limit on the sum of |w|, checked against an upper bound that grows with the number of examples.
-// For 70 captured steps with five parameters the bound is 230, while the real sum stays below 3.
+// Limit on the sum of |w|. It is compared with an upper bound that increases with the number of
+// examples. For 70 captured steps with five parameters, the bound is 230, while the real sum stays
+// below 3.
 constexpr double kMaxWeightSum = 1e6;
 // Tolerance for sums of weights that must be 1.
 constexpr double kSumTolerance = 1e-7;
@@ -143,7 +145,7 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
 }
 
 // Checks that all sites are inside the ranges of their parameters. Requests are clamped to the hull
-// of the sites, so they then stay within the bounds that CheckWeightTables verifies.
+// of the sites, and are then within the bounds that CheckWeightTables verifies.
 Status CheckSites(const MotionGroup& group) {
   const std::size_t d = group.parameters.size();
   for (std::size_t l = 0; l < d; ++l) {
@@ -338,7 +340,7 @@ Expected<MotionGroup> LoadGroup(const fb::Group& from, const GridLayout& layout,
   return group;
 }
 
-// Checks that a layer affects only joints that layers may affect, and that its keys can be played.
+// Checks that a layer affects only joints that layers may affect, and that its keys are valid.
 Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_legs) {
   const auto fail = [&](const char* text) { return Fail(ErrorCode::kMalformed, text); };
   if (!IsLayerName(layer.name)) {
@@ -455,7 +457,7 @@ MotionLibrary::~MotionLibrary() {
 }
 
 #ifdef __wasm__
-// WebAssembly maps no files. Its callers use FromBytes.
+// WebAssembly cannot map files. Its callers use FromBytes.
 Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
     const std::filesystem::path& path) {
   return Fail(ErrorCode::kUnsupported, "files cannot be opened in WebAssembly", path.string());

@@ -9,31 +9,33 @@
 namespace stridewire {
 namespace {
 
-// Margin added to each side of a range of components: kMarginOfWidth times its width, plus kMargin.
+// Margin that is added at each end of a component's range: kMarginOfWidth times its width, plus
+// kMargin.
 constexpr double kMarginOfWidth = 0.2;
 constexpr double kMargin = 0.12;
-// Used instead of kMargin for joints that foot planting rotates. Uneven ground, short legs and
-// redirected swings rotate these joints further than the examples do.
+// Replaces kMargin for joints that foot planting rotates. On uneven ground, with short legs and in
+// redirected swings, these joints rotate further than in the examples.
 constexpr double kPlantedMargin = 0.3;
-// A component that varies by less than kStillWidth counts as constant. Its margin only has to
-// compensate for the quantization errors of the joints above it.
+// A component that varies by less than kStillWidth counts as constant. Its margin only has to cover
+// the quantization errors of the joints above it.
 constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
-// Margin of the rotations of standing avatars, which play their loop unchanged. It only has to
-// compensate for quantization errors.
+// Margin for the rotations of standing avatars, which play their loop unchanged. It only has to
+// cover quantization errors.
 constexpr double kIdleMargin = 0.0022;
-// A joint whose w falls below this may rotate in any direction and uses smallest-three encoding.
+// If the w of a joint falls below this, the joint may rotate in any direction and is encoded with
+// "smallest three".
 constexpr double kMinBoundedW = 0.4;
 // A joint whose mean rotation is below 9 degrees uses the identity as its reference. That saves the
 // encoder a multiplication and needs no more bits.
 constexpr float kSmallRotationW = 0.997f;
 
-// Largest error of a joint as an angle. Joints with children get the smaller limit, because their
+// Maximum error of a joint as an angle. Joints with children have the smaller limit, because their
 // children have to compensate for the error.
 constexpr double kMaxInnerErrorRad = 0.002;
 constexpr double kMaxOuterErrorRad = 0.004;
 
-// Largest error of a joint relative to the root: 1 mm minus the root's own error (2^-15 m along
+// Maximum error of a joint relative to the root: 1 mm minus the root's own error (2^-15 m along
 // each axis) and a small allowance for single precision.
 constexpr double kMaxErrorToRootM = 0.001 - 0.0000529 - 0.00002;
 
@@ -126,7 +128,7 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
       least_w_of(std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
                  (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + base_margin));
 
-  // Standing avatars turn joints that are still in all examples.
+  // In idle motion, standing avatars rotate joints that do not move in any example.
   if (!library.has_stand_motion()) return range;
   ForEachRotation(library, library.group(library.idle_group()), joint, [&](const DQuat& q) {
     const DQuat d = back * q;
@@ -141,7 +143,7 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
   return range;
 }
 
-// Distributes bits over the components of all joints. Each bit goes to the component where it
+// Distributes bits over the components of all joints. Each bit goes to the component for which it
 // reduces the error of the least accurate point most.
 class BitAllocator {
  public:
@@ -174,7 +176,7 @@ class BitAllocator {
   void Allocate() {
     while (AddBit()) {
     }
-    // Take back bits that turned out to be unnecessary.
+    // Takes back unnecessary bits.
     for (std::size_t j = joints_.size(); j-- > 0;) {
       for (std::size_t c = 0; c < 3; ++c) {
         while (RemoveBit(j, c)) {
@@ -246,12 +248,14 @@ class BitAllocator {
            static_cast<double>(1 << bits);
   }
 
-  // Returns the largest error of a quantized rotation in radians. If a component is off by half a
-  // step, then w, which follows from the components, is off by half a step times |v| / w.
+  // Returns the maximum error of a quantized rotation in radians. If a component has an error of
+  // half a step, then w, which is computed from the components, has an error of half a step times
+  // |v| / w.
   [[nodiscard]] double AngleOf(std::size_t joint, const Bits& bits) const {
     if (joints_[joint].is_unbounded) {
-      // The error is largest where all four components are 0.5. Then each of the three encoded ones
-      // is off by half of sqrt(1/2) / (2^(b - 1) - 1), and the fourth by the sum of these errors.
+      // The error is largest if all four components are 0.5. Then each of the three encoded
+      // components has an error of half of sqrt(1/2) / (2^(b - 1) - 1), and the fourth has an error
+      // of the sum of these.
       return std::sqrt(6.0) / static_cast<double>((1 << (bits[0] - 1)) - 1);
     }
     double squared = 0.0;
@@ -272,8 +276,8 @@ class BitAllocator {
                static_cast<double>(RotationQuantization::kMinStep);
   }
 
-  // Finds the component whose error shrinks most with one more bit. Returns the gain in radians per
-  // bit, or -1 if no component can take more bits.
+  // Finds the component whose error decreases most with one more bit. Returns the decrease in
+  // radians per bit, or -1 if no component can take more bits.
   double BestComponent(std::size_t j, std::size_t& component) const {
     const Joint& joint = joints_[j];
     double best = -1.0;
@@ -375,7 +379,7 @@ std::vector<std::uint16_t> ChooseReducedJoints(const Skeleton& skeleton,
     reach = std::max(reach, LengthOf(site.offset_m));
   }
   std::vector<double> shift_m(count, 0.0);
-  std::vector<double> below_m(count, 0.0);  // Largest shift of any child of each joint.
+  std::vector<double> below_m(count, 0.0);  // Maximum shift of any child of each joint.
   for (std::size_t j = count; j-- > 0;) {
     const RotationRange& range = ranges[j];
     double squared = 0.0;

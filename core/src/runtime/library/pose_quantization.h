@@ -10,13 +10,13 @@
 
 namespace stridewire {
 
-/// The range of rotations that a joint takes. For every rotation q of the joint, the components
-/// x, y, z of conj(reference) q are between `low` and `high`, and its w is at least `least_w`.
+/// Range of the rotations of a joint. For every rotation q of the joint, the components x, y, z of
+/// conj(reference) q are between `low` and `high`, and its w is at least `least_w`.
 struct RotationRange {
   Quat reference = kIdentityQuat;
   Vec3 low = Vec3(-1.0f);
   Vec3 high = Vec3(1.0f);
-  /// If below RotationQuantization::kMinLeastW, the joint may rotate in any direction.
+  /// If it is below RotationQuantization::kMinLeastW, the joint may rotate in any direction.
   double least_w = 0.0;
 };
 
@@ -28,40 +28,40 @@ struct RotationRange {
 /// Quantization parameters for all joints of a skeleton.
 struct PoseQuantization {
   std::vector<RotationQuantization> joints;
-  /// Largest error in the position of any joint or end site relative to the root, for poses within
+  /// Maximum error in the position of any joint or end site relative to the root, for poses within
   /// the ranges.
   double largest_error_m = 0.0;
 };
 
-/// Chooses the fewest bits that keep every joint and end site within `largest_error_m` of its
-/// position relative to the root.
+/// Chooses the minimum number of bits with which every joint and end site is within
+/// `largest_error_m` of its position relative to the root.
 ///
 /// The encoder must process joints from the root on, and each joint must compensate for the errors
-/// of those above it. Then the error of a joint (an angle) moves only its own bone, and the bound
-/// is the sum of bone length times angle over a chain. No angle is off by more than 0.23 degrees.
-/// `largest_error_m` of the result exceeds the requested one only if all joints have the maximum
-/// number of bits, which takes bones of many metres. `ranges` has one entry per joint. The result
-/// is the same on every machine.
+/// of those above it. The angular error of a joint then moves only its own bone, and the total
+/// error is bounded by the sum of bone length times angle over a chain. No angle has an error of
+/// more than 0.23 degrees. `largest_error_m` of the result exceeds the requested one only if all
+/// joints have the maximum number of bits, which requires bones of many metres. `ranges` has one
+/// entry per joint. The result is the same on every machine.
 [[nodiscard]] PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton,
                                                       std::span<const RotationRange> ranges,
                                                       double largest_error_m);
 
-/// Chooses the joints to send for avatars that are seen from far away, in increasing order.
+/// Chooses the joints to send for avatars that are far away from the viewer, in increasing order.
 ///
-/// A joint is left out if displaying it and all joints below it in their reference rotations moves
+/// A joint is omitted if displaying it and all joints below it in their reference rotations shifts
 /// no joint or end site by more than `largest_shift_m`. The shift caused by one joint is the chord
-/// of its largest rotation from the reference times the length of the chain below it, and shifts
-/// add up along a chain. The root and the parents of chosen joints are never left out. The result
-/// is the same on every machine.
+/// of its largest rotation from the reference times the length of the chain below it. Shifts add up
+/// along a chain. The root and the parents of chosen joints are never omitted. The result is the
+/// same on every machine.
 [[nodiscard]] std::vector<std::uint16_t> ChooseReducedJoints(const Skeleton& skeleton,
                                                              std::span<const RotationRange> ranges,
                                                              double largest_shift_m);
-/// Largest shift of a joint when a library's reduced set of joints is sent.
+/// Maximum shift of a joint if only the reduced set of a library's joints is sent.
 inline constexpr double kReducedJointsShiftM = 0.12;
 [[nodiscard]] std::vector<std::uint16_t> ChooseReducedJoints(const MotionLibrary& library);
 
-/// Finds the ranges of a library and chooses the bits so that, with the root position rounded to
-/// 2^-14 m, every joint is within 1 mm of its position in the world.
+/// Finds the ranges of a library and chooses the bits. With the root position rounded to 2^-14 m,
+/// every joint is then within 1 mm of its position in the world.
 [[nodiscard]] PoseQuantization ChoosePoseQuantization(const MotionLibrary& library);
 
 }  // namespace stridewire

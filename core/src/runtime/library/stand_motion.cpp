@@ -26,10 +26,10 @@ constexpr double kIdleEaseS = 2.0;
 constexpr double kIdleTailS = 2.0;
 static_assert(kIdleTailS >= kIdleEaseS);
 constexpr int kSettleCells = 4;
-// Dense enough for sway of 0.5 Hz. Between grid points the soles move by less than 0.01 mm.
+// Sufficient for sway of 0.5 Hz. Between grid points, the soles move by less than 0.01 mm.
 constexpr int kIdleCellsPerS = 8;
 
-// Amplitudes of the sway of the pelvis and of breathing. While a person stands quietly, the pelvis
+// Amplitudes of the sway of the pelvis and of breathing. When a person stands quietly, the pelvis
 // sways by a few millimetres, more forward than sideways, below 0.5 Hz (Winter, "Human balance and
 // posture control during standing and walking", 1995). Adults breathe about 15 times per minute.
 constexpr double kSwayForwardM = 0.004;
@@ -37,7 +37,7 @@ constexpr double kSwaySidewaysM = 0.0025;
 constexpr int kBreathsPerLoop = 10;  // 0.25 Hz
 constexpr double kChestRad = 0.7 * kRadPerDegree;
 constexpr double kShoulderRad = 0.6 * kRadPerDegree;
-// Weight shifts move the pelvis by this part of the distance between the feet.
+// Weight shifts move the pelvis by this fraction of the distance between the feet.
 constexpr double kShiftPart = 0.09;
 constexpr double kMaxShiftM = 0.02;
 constexpr double kObliquityRad = 1.2 * kRadPerDegree;
@@ -45,15 +45,15 @@ constexpr double kHeadYawRad = 3.0 * kRadPerDegree;
 constexpr double kHeadPitchRad = 1.0 * kRadPerDegree;
 constexpr double kArmRad = 0.8 * kRadPerDegree;
 
-// The distance from hip to ankle is at most that of the stand pose, or this part of the length of
-// the leg if that is longer.
+// Maximum distance from hip to ankle: that of the stand pose, or this fraction of the leg length if
+// that is longer.
 constexpr double kExtension = 0.995;
 
-// A sum of sines that all repeat after kIdleLoopS.
+// A sum of sines with periods that divide kIdleLoopS.
 class Harmonics {
  public:
-  // Uses the multiples `first` to `last` of the loop's frequency. Low frequencies have the largest
-  // amplitudes, as in postural sway. The root mean square of the sum is 1.
+  // Uses the multiples `first` to `last` of the loop's frequency. As in postural sway, low
+  // frequencies have the largest amplitudes. The root mean square of the sum is 1.
   Harmonics(int first, int last, std::uint32_t seed) {
     double square = 0.0;
     std::uint32_t state = seed;
@@ -98,7 +98,7 @@ double WeightAt(double time_s) {
   return weight;
 }
 
-// The joints above the legs, found by their positions in the stand pose.
+// The joints above the legs, identified by their positions in the stand pose.
 struct UpperBody {
   std::vector<std::size_t> spine;  // Joints above the root, up to the one that carries the arms.
   std::vector<std::size_t> neck;   // Joints above the spine, up to the head.
@@ -196,8 +196,8 @@ class IdleGenerator {
     shift_m_ = std::min(kShiftPart * apart_m, kMaxShiftM);
   }
 
-  // Chooses how much lower the pelvis is than in the stand pose, so that both legs reach the ground
-  // in the whole loop. The pelvis would jerk if it were lowered only where a leg is too short.
+  // Chooses how much lower the pelvis is than in the stand pose. Both legs must reach the ground in
+  // the whole loop. If the pelvis were lowered only where a leg is too short, it would jerk.
   // `point_s` is the time between two points of the loop.
   void ChooseDrop(int points, double point_s) {
     drop_m_ = 0.0;
@@ -222,7 +222,7 @@ class IdleGenerator {
   }
 
  private:
-  // Turns a joint about an axis of the world, relative to its orientation in the stand pose.
+  // Rotates a joint about an axis of the world, starting from its orientation in the stand pose.
   void Turn(std::size_t joint, const Vec3& axis, double angle_rad) {
     const Quat parent = joint == 0
                             ? kIdentityQuat
@@ -253,7 +253,7 @@ class IdleGenerator {
     Turn(0, kForwardAxis, lean_rad + tilt_rad);
     TurnAll(body_.spine, kForwardAxis, -0.9 * tilt_rad);
 
-    // 1 with full lungs, -1 with empty ones. People exhale longer than they inhale.
+    // 1 with full lungs, -1 with empty lungs. People exhale longer than they inhale.
     const double breath_rad = kTwoPi * kBreathsPerLoop / kIdleLoopS * time_s;
     const double breath = Sin(breath_rad + 0.35 * Sin(breath_rad));
     TurnAll(body_.spine, kLeftAxis, -kChestRad * breath);
@@ -262,7 +262,7 @@ class IdleGenerator {
     for (const UpperBody::Arm& arm : body_.arms) {
       const Harmonics& swing = arm.side > 0.0 ? left_arm_ : right_arm_;
       if (arm.shoulder != arm.collar) {
-        // The shoulder rises and the arm stays upright.
+        // The shoulder rises, and the arm keeps its direction.
         Turn(arm.collar, kForwardAxis, arm.side * kShoulderRad * breath);
         Turn(arm.shoulder, kForwardAxis, -arm.side * kShoulderRad * breath);
       }
@@ -270,7 +270,7 @@ class IdleGenerator {
     }
   }
 
-  // Returns by how much the pelvis is too high for the legs.
+  // Returns by how much the pelvis must be lowered for the legs to reach the feet.
   [[nodiscard]] double MissingReach() const {
     double missing_m = 0.0;
     LegPose leg;
@@ -296,7 +296,7 @@ class IdleGenerator {
   // [foot]: position of the ankle in the stand pose, relative to the base frame.
   std::array<DVec3, 2> ankles_m_;
   std::array<Quat, 2> ankle_rotations_;  // [foot]
-  std::array<double, 2> longest_m_{};    // [foot]: largest distance from hip to ankle.
+  std::array<double, 2> longest_m_{};    // [foot]: maximum distance from hip to ankle.
   double hip_height_m_ = 1.0;
   double shift_m_ = 0.0;
   double drop_m_ = 0.0;

@@ -11,12 +11,12 @@ namespace stridewire {
 /// Length of the loop of the idle motion, in seconds.
 inline constexpr double kIdleLoopS = 40.0;
 
-/// Motion of standing avatars, generated from the stand pose when a library is opened. Both groups
-/// have the kind kStand, one example and no parameters, and are evaluated like steps.
+/// Motion of standing avatars, which is generated from the stand pose when a library is opened.
+/// Both groups have the kind kStand, one example and no parameters, and are evaluated like steps.
 ///
-///   settle: the stand pose. After its last movement an avatar blends into it.
-///   idle:   a loop of breathing, sway and weight shifts. Its last kIdleTailS seconds repeat its
-///           first ones, so that a blend that begins late in the loop still has time to fade out.
+/// - settle: the stand pose. An avatar blends into it after its last movement.
+/// - idle: a loop of breathing, sway and weight shifts. Its last kIdleTailS seconds repeat its
+///   first ones, so that a blend that begins late in the loop has time to fade out.
 ///
 /// The feet do not move. The same skeleton and stand pose give the same bits on every machine.
 struct StandMotion {

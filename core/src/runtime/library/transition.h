@@ -4,8 +4,8 @@
 
 namespace stridewire {
 
-/// Measures how well movements of one group can continue with movements of another group. It refers
-/// to the best pair of an example of the first group, at its end, and an example of the second
+/// Measures how well movements of one group can follow movements of another group. The values are
+/// those of the best pair: an example of the first group, at its end, and an example of the second
 /// group, at its start.
 struct Transition {
   /// In metres: root mean square distance of the joints, plus kTransitionVelocityS times that of
@@ -15,8 +15,8 @@ struct Transition {
   std::int32_t start_example = -1;  ///< Example of the second group; -1: the stand.
 };
 
-/// A difference in velocity counts as the distance that it covers in this time, which is half of
-/// the time over which a difference pose fades out.
+/// The distance of two velocities is the distance that their difference covers in this time. It is
+/// half of the time over which a difference pose fades out.
 inline constexpr double kTransitionVelocityS = 0.1;
 
 }  // namespace stridewire

@@ -13,7 +13,7 @@ CellWeights CellWeightsAt(double grid_position, int point_count) {
   const double right = f * (0.5 + f * (2.0 - 1.5 * f));
   const double after = f * f * (-0.5 + 0.5 * f);
   // Beyond an end, a missing neighbour is extrapolated as p_-1 = 3 p_0 - 3 p_1 + p_2. The tangent
-  // at the end then is the one-sided second-order difference.
+  // at the end is then the one-sided second-order difference.
   if (cell == 0) {
     return {0,
             3,

@@ -7,7 +7,7 @@ namespace stridewire {
 /// Catmull-Rom weights of the grid points around a position in a grid. Points beyond the ends of
 /// the grid are extrapolated quadratically.
 struct CellWeights {
-  int first = 0;  ///< Grid point that weights[0] belongs to.
+  int first = 0;  ///< Grid point to which weights[0] belongs.
   int count = 0;  ///< Number of weights, 2 to 4.
   std::array<float, 4> weights{};
 };

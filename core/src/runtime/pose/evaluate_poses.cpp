@@ -11,8 +11,8 @@
 namespace stridewire {
 namespace {
 
-// Limits on the speed of a difference pose; no body moves faster. They bound the overshoot of a
-// blend to 4/27 of this speed times the length of the blend.
+// Limits on the speed of a difference pose, which are above all speeds of human bodies. The
+// overshoot of a blend is at most 4/27 of this speed times the length of the blend.
 constexpr float kMaxJointRadPerS = 20.0f;
 constexpr float kMaxRootMPerS = 4.0f;
 
@@ -67,7 +67,8 @@ void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const
 
 namespace {
 
-// The position of a pose in its movement, and how much of the difference pose remains there.
+// The position of a pose in its movement, and the fraction of the difference pose that remains
+// there.
 struct PoseSample {
   GridSample grid;
   float fraction;  // Remaining fraction of the difference pose.
@@ -116,8 +117,8 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
   }
 }
 
-// Executes the operations of kernels::ComputeGridSamples for a single time, for which scalars are
-// faster.
+// Executes the operations of kernels::ComputeGridSamples for a single time, for which scalar code
+// is faster.
 PoseSample SampleAt(const MotionGroup& group, const Movement& movement, double time_s) {
   const CellWeights cell =
       CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);
@@ -165,7 +166,7 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement) {
-  // Before its start, a movement is extrapolated by reflecting its first moments.
+  // A movement is extrapolated to times before its start by reflecting its first moments.
   const bool is_reflected = movement.start_offset_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
                 movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache,

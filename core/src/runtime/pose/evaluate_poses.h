@@ -11,9 +11,9 @@
 
 namespace stridewire {
 
-/// Caches the weighted sums of the examples at grid points. A sum costs n multiply-adds per number;
-/// between grid points the sums are only interpolated. Results do not depend on the state of the
-/// cache. Takes 17 KB and never allocates.
+/// Caches the weighted sums of the examples at grid points. A sum costs n multiply-adds per number,
+/// whereas poses between grid points are only interpolated. Results do not depend on the state of
+/// the cache. Takes 17 KB and never allocates.
 class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
@@ -30,8 +30,8 @@ class GridCache {
                                            int point);
 
  private:
-  // Maximum number of cached grid points. It is enough for all points of most movements. If rows
-  // have the maximum length, only the four points around a time fit.
+  // Maximum number of cached grid points. It is sufficient for all points of most movements. If
+  // rows have the maximum length, only the four points around a time fit.
   static constexpr std::size_t kMaxSlots = 32;
   static constexpr std::size_t kRowsFloats = 4 * kMaxRowFloats;
   std::size_t row_floats_;

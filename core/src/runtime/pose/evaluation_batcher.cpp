@@ -9,7 +9,8 @@ namespace {
 // The radix sort takes two passes, one per half of the key.
 constexpr int kHalfBits = 11;
 constexpr std::uint32_t kHalfMask = (1u << kHalfBits) - 1;
-constexpr std::uint32_t kParts = 64;  // The sort key divides a movement into these parts.
+// In the sort key, the time within a movement is one of this many parts.
+constexpr std::uint32_t kParts = 64;
 
 }  // namespace
 
@@ -62,14 +63,16 @@ std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t 
   STRIDEWIRE_CHECK(begin < order_.size() && order_.size() == items_.size());
   std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
   const bool is_planted = order_[begin].run.movement->feet.is_active;
-  // Runs with planting come last, so a block ends before the first run that differs from `begin`.
+  // Runs with planting come last, so a block ends before the first run that differs from its first
+  // one.
   while (order_[end - 1].run.movement->feet.is_active != is_planted) --end;
-  // The first run of a block decides how many poses are evaluated, so none may be longer.
+  // The first run of a block determines how many poses are evaluated, so no other run may be
+  // longer.
   STRIDEWIRE_CHECK(order_[end - 1].count <= order_[begin].count);
   return std::span(order_).subspan(begin, end - begin);
 }
 
-// Prefetches a share of the data of the next two blocks while one pose of a block is evaluated: the
+// While one pose of a block is evaluated, prefetches a part of the data of the next two blocks: the
 // arrays to which the movements of the next block point, and the movements of the block after it.
 void EvaluationBatcher::PrefetchNext(std::size_t end, int pose, int count) const {
   const std::size_t lanes = SoaPose::kLanes;

@@ -10,8 +10,8 @@
 
 namespace stridewire {
 
-/// Returns the number of poses, 1 to `most`, that a movement still has before its end. They start
-/// at `time_s` and are `ticks_apart` ticks of `step_s` seconds apart.
+/// Returns the number of poses, 1 to `most`, before the end of a movement. The first pose is at
+/// `time_s`, and poses are `ticks_apart` ticks of `step_s` seconds apart.
 [[nodiscard]] int SampleRunCount(const Movement& movement, double time_s, double step_s,
                                  int ticks_apart, int most);
 
@@ -22,17 +22,17 @@ namespace stridewire {
 /// and fade out their difference poses together. The batcher keeps its memory between evaluations.
 class EvaluationBatcher {
  public:
-  /// Largest number of poses per run.
+  /// Maximum number of poses per run.
   static constexpr int kMaxCount = 32;
 
   struct Item {
     SampleRun run;
-    std::uint32_t key = 0;  ///< Sort key; similar runs have similar keys.
+    std::uint32_t key = 0;  ///< Sort key. Similar runs have similar keys.
     std::uint32_t tag = 0;  ///< Identifies the run for the caller.
     int count = 1;          ///< Number of poses in the run.
   };
 
-  /// Reserves memory for this number of runs. Within it, no other function allocates.
+  /// Reserves memory for this number of runs. Up to that number, no other function allocates.
   void Reserve(std::size_t runs);
 
   /// Adds a run of `count` poses, 1 to kMaxCount. Its movement must stay alive until Evaluate

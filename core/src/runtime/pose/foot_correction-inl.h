@@ -28,13 +28,13 @@ struct CorrectionOf {
   Vector offset;
   Number swing;       // Elapsed fraction of the swing: 0 before release, 1 after landing.
   Number turned;      // Fraction of the change in heading and tilt that is complete.
-  Number tilted;      // Share of the ground's slope by which the foot tilts.
+  Number tilted;      // Fraction of the ground's slope by which the foot tilts.
   Number turn;        // Turn that is added to the heading, in radians.
   Number free_turn;   // Turn that would be added if the heading were not locked.
   Vector root_shift;  // Part of FootTrajectory::root_shift_m that is complete.
 };
 
-// Returns the share of a lift that is added at a fraction of the swing.
+// Returns the fraction of a lift that is added at a fraction of the swing.
 template <typename Number>
 STRIDEWIRE_INLINE Number LiftShareOf(const LiftCurve& curve, Number swing) {
   return (Constant<Number>(1.0) -
@@ -42,15 +42,15 @@ STRIDEWIRE_INLINE Number LiftShareOf(const LiftCurve& curve, Number swing) {
          EaseOut(DivideBy(swing - Constant<Number>(curve.falls), curve.end - curve.falls));
 }
 
-// Returns the share of FootTrajectory::settle_lift_m that is added when the fraction `settled` of
-// the difference pose has faded out.
+// Returns the fraction of FootTrajectory::settle_lift_m that is added when the fraction `settled`
+// of the difference pose has faded out.
 template <typename Number>
 STRIDEWIRE_INLINE Number SettleLiftShareOf(Number settled) {
   return Constant<Number>(4.0) * settled * (Constant<Number>(1.0) - settled);
 }
 
-// Returns the share of the root's descent (FootTrajectory::root_shift_m.y) that is complete after
-// the fraction `elapsed` of the movement.
+// Returns the fraction of the root's descent (FootTrajectory::root_shift_m.y) that is complete
+// after the fraction `elapsed` of the movement.
 template <typename Number>
 STRIDEWIRE_INLINE Number RootSinkShareOf(Number elapsed) {
   return Constant<Number>(1.0) -
@@ -106,8 +106,8 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
                trajectory.lift[1] * LiftShareOf(kLiftCurves[1], s) +
                trajectory.lift[2] * LiftShareOf(kLiftCurves[2], s);
 
-  // The extra turn of the body does not rotate a standing foot. During its swing, the foot catches
-  // up with the turn that the body will have made by the time it lands.
+  // The extra turn of the body does not rotate a standing foot. During its swing, the foot turns by
+  // the angle by which the body will have turned when the foot lands.
   c.turned = one - EaseOut(s);
   const Number late =
       EaseOut(DivideBy(s - Constant<Number>(kLandingTiltStart), 1.0 - kLandingTiltStart));
@@ -127,8 +127,8 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   c.free_turn = free;
 
   // The heading of a standing foot is locked while its sole is on the ground, and free with the
-  // heel up: seen from above, a foot on its toes is too short to have a heading. Once the ankle has
-  // passed the ball, the direction from ankle to ball is reversed and is not a heading either.
+  // heel up. Seen from above, a foot on its toes is too short to have a heading. Once the ankle has
+  // passed the ball, the direction from ankle to ball is reversed, so it is not a heading either.
   const Number print_heading = Select(has_landed, trajectory.to_heading, trajectory.from_heading);
   const Number error = WrapAngle(print_heading - heading - free);
   const Number ahead =
@@ -150,8 +150,8 @@ struct RootResidualOf {
   Number approach_over_s;
 };
 
-// Adds the remaining part of the root's residual to its shift. The height takes longer than the
-// horizontal part, because a body climbs as long as its leg stretches.
+// Adds the remaining part of the root's residual to its shift. The vertical part takes longer than
+// the horizontal part, because a body rises for as long as its leg extends.
 template <typename Number, typename Vector, typename Timing>
 STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timing,
                                          const RootResidualOf<Number, Vector>& residual) {

@@ -93,7 +93,7 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   return t;
 }
 
-// The part of a movement's plan that concerns both feet, and the time to evaluate.
+// The part of a movement's plan that is common to both feet, and the time to evaluate.
 struct PlanCommon {
   RootResidualOf<Float, SoaVec3> root_residual;
   Float extra_turn, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
@@ -113,16 +113,16 @@ struct SoaLeg {
 
 HWY_INLINE SoaVec3 Broadcast(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
-// Calls `step` for both legs. Each computation for a leg depends on the previous one, so the two
-// legs alternate: the processor works on one leg while results of the other are pending.
+// Calls `step` for both legs alternately. Each computation for a leg depends on the previous one.
+// The processor can therefore work on one leg while results of the other are pending.
 template <typename Step>
 HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[0], std::size_t{0});
   step(rig.bones[1], std::size_t{1});
 }
 
-// Maps places in a leg's chain to joints in an array of rotations: those of the skeleton, or those
-// of LegRig::joints alone.
+// Maps positions in a leg's chain to joints in an array of rotations: those of the skeleton, or
+// only those of LegRig::joints.
 using JointMap = std::size_t (LegRig::Bones::*)[kMaxLegChain];
 
 HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, SoaQuat root, SoaLeg* legs,
@@ -201,8 +201,8 @@ HWY_INLINE SoaCorrection CorrectFoot(const PlanCommon& common, const SoaTrajecto
   return c;
 }
 
-// Returns the depth of a sole below the ground plane of a footprint, in metres. It fades to zero
-// with the distance between the foot and the footprint.
+// Returns the depth of a sole below the ground plane of a footprint, in metres. The depth fades to
+// zero with increasing distance between the foot and the footprint.
 HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& bones,
                             const SoaLeg& leg, SoaVec3 ball, SoaQuat turn) {
   const Float dx = ball.x - print.x;
@@ -313,8 +313,8 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarg
   });
 }
 
-// Returns by how much the root has to be lower so that a leg reaches its ankle target. `blended_m`
-// is the distance from hip to ankle in the blended pose, `reach` the vector from hip to target.
+// Returns by how much the root must be lowered for a leg to reach its ankle target. `blended_m` is
+// the distance from hip to ankle in the blended pose, `reach` the vector from hip to target.
 HWY_INLINE Float LowerFor(float length_m, Float blended_m, SoaVec3 reach) {
   const auto part = [&](double fraction)
                         HWY_ATTR { return Float(static_cast<float>(fraction) * length_m); };
@@ -399,8 +399,8 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
           (Float(1.0f) - second) *
               DepthBelow(trajectory.from, trajectory.normals[0], bones, leg, at, c.turn) +
           second * DepthBelow(trajectory.to, trajectory.normals[1], bones, leg, at, c.turn);
-      // The root follows this lift as it follows the other corrections of the foot. The shares of
-      // the two feet change gradually, because the feet swap their roles from step to step.
+      // The root follows this lift as it follows the other corrections of the foot. The fractions
+      // for the two feet change gradually, because the feet exchange their roles from step to step.
       const Float entered = common.OfEaseOut(common.time_s - common.start_offset_s);
       const Float share =
           trajectory.root_weight +
@@ -430,8 +430,8 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   const Float overlap = Float(static_cast<float>(kLowerOverlap)) * lowers[0] * lowers[1];
   shift.y = shift.y - Float(0.5f) * (lowers[0] + lowers[1] + Sqrt(apart * apart + overlap));
 
-  // The pose stores the root as floats in world space. Round the root first, so that the legs are
-  // solved from the root position that is displayed.
+  // The pose stores the root as floats in world space. The root is rounded first, so that the legs
+  // are solved for the displayed root position.
   HWY_ALIGN float shifts_m[3 * kBlock];
   StoreLanes(shift.x, shifts_m);
   StoreLanes(shift.y, shifts_m + kBlock);
@@ -468,7 +468,8 @@ HWY_INLINE void BroadcastAll(const float* from, std::size_t count, float* to) {
   for (std::size_t i = 0; i < count; ++i) hn::Store(hn::Set(d, from[i]), d, to + i * kBlock);
 }
 
-// Plants the feet of one pose: evaluates the same pose in all lanes of a vector and uses the first.
+// Plants the feet of one pose. Evaluates the same pose in all lanes of a vector and uses the first
+// lane.
 void PlantPose(const LegRig& rig, const PlantPoseJob& job) {
   HWY_ALIGN float plan[kPackedPlanFloats * kBlock];
   HWY_ALIGN float rotations[LegRig::kMaxJointsOfLegs * 4 * kBlock];

@@ -16,13 +16,13 @@ struct GridSample {
   std::array<float, 4> weights;  ///< Weight of each point.
 };
 
-/// Returns the index of point `k` of a sample. For indices beyond the last grid point, returns the
+/// Returns the index of point `k` of a sample. For points beyond the last grid point, returns the
 /// last point: their weight is zero, but the row is still read.
 [[nodiscard]] inline int GridPointOf(const MotionGroup& group, const GridSample& sample, int k) {
   return std::min(sample.first_point + k, group.grid_point_count - 1);
 }
 
-/// Sets the piece of a movement's time warp that is used for a lane.
+/// Sets the piece of a movement's time warp for a lane.
 inline void SetWarpPiece(const TimeWarp::Piece& piece, std::size_t lane,
                          kernels::GridTimes& times) {
   times.begin_s[lane] = piece.begin_s;
@@ -64,8 +64,8 @@ inline void BlendRow(const MotionGroup& group, const GridLayout& layout, const M
                        static_cast<std::size_t>(layout.row_floats), row);
 }
 
-/// Replaces rotations of a blended row that cancel each other, and so have no mean, by those of the
-/// example with the largest weight.
+/// Rotations that cancel each other out have no mean. Replaces such rotations of a blended row with
+/// those of the example with the largest weight.
 void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                        const GridSample& sample, float* row);
 

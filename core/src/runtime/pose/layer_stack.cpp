@@ -21,8 +21,8 @@ double Progress(const LayerStack::Playing& p) {
 double WeightOf(const LayerStack::Playing& p) {
   const double weight = p.from_weight + (p.to_weight - p.from_weight) * SmoothStep(Progress(p));
   if (p.elapsed_s >= p.slope_s) return std::clamp(weight, 0.0, 1.0);
-  // t (1 - t / T)^2 has slope 1 at t = 0 and value and slope 0 at t = T. It lets the weight start
-  // with the slope that it had before.
+  // t (1 - t / T)^2 has slope 1 at t = 0, and value and slope 0 at t = T. With this term, the
+  // weight starts with its previous slope.
   const double left = 1.0 - p.elapsed_s / p.slope_s;
   return std::clamp(weight + p.slope * p.elapsed_s * left * left, 0.0, 1.0);
 }
@@ -37,7 +37,7 @@ double SlopeOf(const LayerStack::Playing& p) {
   return slope;
 }
 
-// Starts a blend from the current weight and speed to new ones. The slope that the weight has now
+// Starts a blend from the current weight and speed to new ones. The current slope of the weight
 // fades out within the remaining time of the previous blend, so that the weight does not overshoot.
 void StartBlend(double weight, double speed, double blend_s, LayerStack::Playing& p) {
   const double left_s = std::max(0.0, std::max(p.ease_s, p.slope_s) - p.elapsed_s);
@@ -126,7 +126,7 @@ void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
 }
 
 Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing> playing) {
-  // Limit on the time in a clip. It is far above the longest clip, which takes ten minutes.
+  // Limit on the time in a clip. The longest clip takes ten minutes, which is far below this.
   constexpr double kLongestS = 1e6;
   const auto is_valid = [&](const Playing& p) {
     const auto is_fraction = [](double value) { return IsWithin(value, 0.0, 1.0); };

@@ -17,7 +17,7 @@ class MotionLibrary;
 /// that is set or restored allocates, unless Reserve was called.
 class LayerStack {
  public:
-  /// Largest number of layers that play at the same time, including those that ease out.
+  /// Maximum number of layers that play at the same time, including those that ease out.
   static constexpr std::size_t kMaxLayers = 4;
 
   /// A layer that is playing.
@@ -40,12 +40,12 @@ class LayerStack {
     double blend_s = 0.0;  // Blend time as requested; used when a non-looping clip ends.
   };
 
-  /// Starts, changes or ends a layer. A playing layer takes the new weight and speed. A layer that
-  /// is easing out comes back if it loops; otherwise it is started a second time. Ending a layer
-  /// that is not playing has no effect.
+  /// Starts, changes or ends a layer. If the layer is playing, it eases to the new weight and
+  /// speed. If it is easing out, it eases in again if it loops, and is otherwise started a second
+  /// time. Ending a layer that is not playing has no effect.
   ///
-  /// kNotFound: there is no such layer. kOutOfRange: a number is not finite or out of its range.
-  /// kLimitExceeded: kMaxLayers are playing. On error nothing changes.
+  /// Errors: kNotFound if there is no such layer. kOutOfRange if a number is not finite or out of
+  /// its range. kLimitExceeded if kMaxLayers are playing. On error nothing changes.
   [[nodiscard]] Status Set(const MotionLibrary& library, const LayerRequest& request);
 
   /// Advances all layers by `dt_s`. Non-looping clips ease out before their end.
@@ -57,18 +57,18 @@ class LayerStack {
   [[nodiscard]] std::span<const Playing> playing() const { return playing_; }
   /// Allocates memory for kMaxLayers, so that later calls do not allocate.
   void Reserve() { playing_.reserve(kMaxLayers); }
-  /// Ends all layers at once and keeps the memory.
+  /// Ends all layers at once. Keeps the memory.
   void Clear() { playing_.clear(); }
   [[nodiscard]] bool empty() const { return playing_.empty(); }
 
-  /// Replaces the layers by those of another stack of the same library. kOutOfRange: the state is
-  /// not valid; nothing changes then.
+  /// Replaces the layers with those of another stack of the same library. Fails with kOutOfRange
+  /// and changes nothing if the state is invalid.
   [[nodiscard]] Status Restore(const MotionLibrary& library, std::span<const Playing> playing);
 
  private:
   [[nodiscard]] Playing* Find(int layer, bool is_ending);
 
-  // Gets room for kMaxLayers when the first layer starts; most avatars have none.
+  // Allocates memory for kMaxLayers when the first layer starts. Most avatars have no layers.
   std::vector<Playing> playing_;
 };
 

@@ -12,7 +12,7 @@
 namespace stridewire {
 namespace {
 
-// The arithmetic that foot_correction-inl.h needs, in doubles.
+// The arithmetic for foot_correction-inl.h, with doubles.
 template <typename Number>
 constexpr Number Constant(double value) {
   return value;
@@ -33,8 +33,9 @@ T AddBoth(const T& base, const T& a, const T& b) {
 #include "runtime/pose/foot_correction-inl.h"
 #undef STRIDEWIRE_INLINE
 
-// Returns the time over which planting spreads changes of the root: the duration of the movement.
-// If both feet stand throughout, the root instead moves while the difference pose fades out.
+// Returns the time over which planting distributes changes of the root: the duration of the
+// movement. If both feet stand throughout, the root moves while the difference pose fades out
+// instead.
 double SpreadTime(const Movement& movement) {
   const auto& feet = movement.feet.feet;
   const bool stands =
@@ -165,8 +166,7 @@ FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Mo
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement) {
-  // A standing foot that descends faster than this, in m/s, would sink into the ground. The ground
-  // stops a real foot.
+  // Maximum speed at which a standing foot descends, in m/s. The ground stops a faster foot.
   constexpr double kMaxDescentSpeed = 0.5;
   FootPlan& plan = movement.feet;
   const double per_s = 1.0 / kBlendStepS;

@@ -8,10 +8,10 @@
 
 namespace stridewire {
 
-/// Time in which the residual of the root fades out.
+/// Time over which the residual of the root fades out.
 inline constexpr double kRootShiftS = 0.25;
-/// The vertical residual takes this fraction of the movement, if that is longer, because a body
-/// climbs as long as its leg stretches.
+/// The vertical residual fades over this fraction of the movement, if that is longer, because a
+/// body rises for as long as its leg extends.
 inline constexpr double kRootRisePart = 0.75;
 
 /// A foot in the blended pose, before planting.
@@ -64,20 +64,21 @@ struct FeetCorrection {
                                          const Movement& movement, double time_s,
                                          ConstPoseSpan pose);
 
-/// Sets the residuals of a movement's plan so that the corrections continue smoothly. `before` are
-/// the corrections of the previous movement at the start of this one and kBlendStepS earlier.
-/// `planned` are those of the plan at the start and kBlendStepS later, and `blended` the feet
-/// without corrections at those times. Two equal elements stand for zero velocity. The descent of a
-/// foot that has just landed is stopped.
+/// Sets the residuals of a movement's plan so that the corrections continue smoothly. `before`
+/// contains the corrections of the previous movement at the start of this one, and kBlendStepS
+/// earlier. `planned` contains those of the plan at the start, and kBlendStepS later. `blended`
+/// contains the feet without corrections at those times. Two equal elements mean zero velocity. If
+/// a foot has just landed, its descent stops.
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement);
 
-/// Starts a plant fade in a planned movement. `displayed` is the pose at its start, without planted
-/// feet, and also the blended pose of that time. `pose` is scratch of the same size.
+/// Starts a plant fade in a planned movement. `displayed` is the pose at its start, which has no
+/// planted feet and is also the blended pose at that time. `pose` is scratch memory of the same
+/// size.
 void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose);
 
-/// Final step of planting: adds the part of the plant fade that remains (FootPlan::plant_fade_s).
+/// Final step of planting: adds the remaining part of the plant fade (FootPlan::plant_fade_s).
 void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
 /// Returns a foot of a pose whose root is at `root_m`.
@@ -88,8 +89,8 @@ void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, 
 [[nodiscard]] PackedFootPlan PackFootPlan(const Movement& movement);
 
 /// Plants the feet of a blended pose with its difference pose. Shifts the root by the weighted
-/// corrections of the feet, lowers it until both legs reach, and bends the legs accordingly. Never
-/// allocates. Same bytes on every machine.
+/// corrections of the feet, lowers it until both legs reach their targets, and bends the legs
+/// accordingly. Never allocates. Gives the same bytes on every machine.
 void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
 }  // namespace stridewire

@@ -20,8 +20,8 @@ HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
 namespace {
 
-// Keeps a value in a register. Otherwise g++ reads it from memory again for every multiplication,
-// and the kernel is limited by the number of reads.
+// Keeps a value in a register. Otherwise, g++ reads it from memory again for every multiplication,
+// and memory reads limit the kernel.
 HWY_INLINE void StayInRegister([[maybe_unused]] hn::Vec<FloatTag>& x) {
 #if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL
   asm("" : "+v"(x.raw));
@@ -29,8 +29,8 @@ HWY_INLINE void StayInRegister([[maybe_unused]] hn::Vec<FloatTag>& x) {
 }
 
 // Sums `Vectors` vectors, starting at offset `at`, of the rows of `Rows` movements at the same
-// time. The sums are independent, so their additions overlap, and each value read from the library
-// is used for all movements.
+// time. The sums are independent, so their additions overlap. Each value that is read from the
+// library is used for all movements.
 template <std::size_t Rows, std::size_t Vectors>
 HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const* weights,
                            std::size_t count, std::size_t row_floats, float* const* rows,
@@ -67,7 +67,7 @@ HWY_INLINE void SumRowsOf(const float* examples, const float* const* weights, st
       SumVectors<Rows, Vectors>(examples, weights, count, row_floats, rows, i);
     }
   };
-  // Use as many sums at a time as there are registers.
+  // Uses as many sums at a time as there are registers.
   if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<8>();
   if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<6>();
   take.template operator()<4>();
@@ -94,7 +94,7 @@ void BlendPoints(const float* const* HWY_RESTRICT points, const float* HWY_RESTR
 
 void BlendRows(const BlendRowsJob& run) {
   const auto last = static_cast<std::size_t>(run.point_count) - 1;
-  std::size_t next[kBlock] = {};  // Next pose of each lane.
+  std::size_t next[kBlock] = {};  // Index of the next pose of each lane.
   const auto first_of = [&](std::size_t i) HWY_ATTR {
     return static_cast<std::size_t>(run.samples[next[i]].first_point[run.lane + i]);
   };
@@ -124,7 +124,7 @@ void BlendRows(const BlendRowsJob& run) {
       for (; next[lane] < run.poses; ++next[lane]) {
         const std::size_t first = first_of(lane);
         if ((first + 3 < last ? first + 3 : last) != point) break;
-        // Points beyond the last have weight zero, but a row is read for them nevertheless.
+        // Points beyond the last one have weight zero, but a row is read for them nevertheless.
         const float* points[4];
         float part[4];
         const GridSamples& place = run.samples[next[lane]];
@@ -147,7 +147,7 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   std::size_t next = 0;
   while (next < blend.joint_count) {
     // If fewer joints remain than a vector holds, the last vector also repeats some earlier joints,
-    // with the same results. So no vector is partly empty.
+    // with the same results. No vector is therefore partly empty.
     const std::size_t j = next + width > blend.joint_count && blend.joint_count >= width
                               ? blend.joint_count - width
                               : next;
@@ -203,9 +203,8 @@ void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& 
     u = hn::IfThenElse(hn::Ge(time, end_s), end, u);
     u = hn::IfThenElse(hn::Gt(time, begin_s), u, begin);
 
-    // Catmull-Rom weights. Beyond an end, a missing neighbour is extrapolated as
-    // p_-1 = 3 p_0 - 3 p_1 + p_2. The tangent at the end then is the one-sided second-order
-    // difference.
+    // Catmull-Rom weights. Beyond an end, a missing neighbour is extrapolated as p_-1 = 3 p_0 - 3
+    // p_1 + p_2. The tangent at the end is then the one-sided second-order difference.
     const auto last = hn::Load(d, times.last_cell + i);
     const auto cell = hn::Min(hn::Max(hn::Trunc(u), zero), last);
     const auto f = hn::Min(hn::Max(hn::Sub(u, cell), zero), one);

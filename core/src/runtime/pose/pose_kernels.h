@@ -15,7 +15,7 @@ namespace stridewire::kernels {
 /// Poses of up to kBlock movements are processed side by side, one movement per lane. An array
 /// [n][kBlock] holds n numbers per lane. Unused lanes are read, but their content does not matter.
 
-/// Largest number of movements per block. Rows have a multiple of this many floats.
+/// Maximum number of movements per block. Rows have a multiple of this many floats.
 inline constexpr std::size_t kBlock = 16;
 
 /// row = sum of weights[e] * examples[e * row_floats ...] over `count` examples, in order.
@@ -36,7 +36,7 @@ struct GridTimes {
   /// Copies of the members of Movement that have these names.
   alignas(64) double duration_s[kBlock], start_offset_s[kBlock], ease_out_s[kBlock];
 };
-/// Positions of poses in their grids, and how much of their difference poses remains.
+/// Positions of poses in their grids, and the fractions of their difference poses that remain.
 struct GridSamples {
   alignas(64) std::int32_t first_point[kBlock];  ///< First of the four points to interpolate
   /// Weights of these points; 0 beyond the last point
@@ -47,8 +47,8 @@ struct GridSamples {
   alignas(64) float fraction[kBlock];  ///< EaseOut of the elapsed fraction of the ease-out
   alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of that fraction, times ease_out_s
 };
-/// Finds the samples of `count` times: Catmull-Rom weights of the four grid points around the
-/// position that the time warp gives. Points beyond the ends of the grid are extrapolated
+/// Computes the samples for `count` times: Catmull-Rom weights of the four grid points around the
+/// position that the time warp determines. Points beyond the ends of the grid are extrapolated
 /// quadratically. Uses doubles and the operations of TimeWarp::GridPosition and EaseOut, in the
 /// same order.
 void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples);
@@ -88,14 +88,15 @@ struct RotationBlend {
 };
 
 /// Writes the unit rotations to out[joint] x y z w. Returns false if a rotation of the row is
-/// shorter than kSmallestNorm. Then the examples' rotations cancel each other and have no mean, and
-/// the output for that joint is undefined.
+/// shorter than kSmallestNorm. In this case, the examples' rotations cancel each other out and have
+/// no mean, and the output for that joint is undefined.
 [[nodiscard]] bool BlendRotations(const RotationBlend& blend, float* out);
 
 /// A sum of rotations that is shorter than this has no usable direction.
 inline constexpr float kSmallestNorm = 0.1f;
 
-/// Sine and cosine of `count` angles with |x| <= 1e5, the same bits as Sin and Cos of base/trig.h.
+/// Computes sine and cosine of `count` angles with |x| <= 1e5. The results have the same bits as
+/// Sin and Cos of base/trig.h.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);
 
 /// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.
@@ -104,11 +105,12 @@ void Transpose(const float* const from[kBlock], std::size_t count, std::size_t l
 /// Number of floats per joint that PrepareDifferences writes: the rotation vector of half the short
 /// arc, and the square of its length.
 inline constexpr std::size_t kDifferenceFloats = 4;
-/// Precomputes, for a difference pose [joint][x y z w][kBlock], the quantities that stay constant
-/// while it fades out: [joint][kDifferenceFloats][kBlock].
+/// Precomputes, for a difference pose [joint][x y z w][kBlock], the values that stay constant while
+/// it fades out: [joint][kDifferenceFloats][kBlock].
 void PrepareDifferences(const float* difference, std::size_t joint_count, std::size_t lanes,
                         float* ease);
-/// fastest[lane] = the largest squared length of any vector of `velocity`, [joint][x y z][kBlock].
+/// Sets fastest[lane] to the largest squared length of any vector in `velocity`, [joint][x y
+/// z][kBlock].
 void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::size_t lanes,
                            float* fastest);
 

@@ -136,9 +136,9 @@ HWY_INLINE Float CosNearZero(Float square) {  // |x| <= pi / 2
   return p * square + Float(1.0f);
 }
 
-// Parts of slerp(1, q, fraction), along the short arc, that do not depend on the fraction. The
-// tangent of a quarter of the angle is m = |xyz| / (1 + |w|), and half the angle is 2 atan m. This
-// avoids a division by a small sine.
+// The parts of slerp(1, q, fraction), along the short arc, that do not depend on the fraction. The
+// tangent of a quarter of the angle is m =
+// xyz| / (1 + |w|), and half the angle is 2 atan m. This avoids a division by a small sine.
 struct SlerpParts {
   SoaVec3 half;  // Rotation vector of half the angle.
   Float square;  // |half|^2
@@ -172,7 +172,7 @@ HWY_INLINE SoaQuat SlerpOf(SlerpParts parts, Float fraction) {
   return {xyz.x, xyz.y, xyz.z, cosine};
 }
 
-// Angle of the vector (x, y) in [-pi, pi]. Returns 0 for (0, 0).
+// Returns the angle of the vector (x, y) in [-pi, pi]. Returns 0 for (0, 0).
 HWY_INLINE Float Atan2(Float y, Float x) {
   const Float ax = Abs(x);
   const Float ay = Abs(y);
@@ -190,15 +190,15 @@ HWY_INLINE Float WrapAngle(Float angle) {
   return angle - Float(6.28318530718f) * Round(angle * Float(0.159154943092f));
 }
 
-// Rotation about +Y by an angle in [-pi, pi].
+// Returns the rotation about +Y by an angle in [-pi, pi].
 HWY_INLINE SoaQuat YawRotation(Float yaw) {
   const Float half = Float(0.5f) * yaw;
   const Float square = half * half;
   return {Float(0.0f), half * SinOverX(square), Float(0.0f), CosNearZero(square)};
 }
 
-// Loads consecutive quaternions x y z w. If fewer than a full vector remain, `left` of them, the
-// other lanes are zero.
+// Loads consecutive quaternions x y z w. If only `left` of them remain, fewer than a full vector,
+// the other lanes are zero.
 HWY_INLINE SoaQuat LoadQuats(const float* at, std::size_t left) {
   const FloatTag d;
   HWY_ALIGN float buffer[4 * kBlock];

@@ -65,7 +65,7 @@ void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::
 struct DifferenceState {
   bool is_any = false;
   bool is_any_inertial = false;
-  // True if all lanes are eased and inertial, so that no lanes have to be masked out.
+  // True if all lanes are eased and inertial, so that no lanes must be masked out.
   bool are_all = false;
   Mask is_eased, is_inertial;
   Float fraction, half_s;
@@ -138,7 +138,7 @@ bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
                              LoadLanes(blend.is_inertial + lane) < half);
       }
     }
-    // Adding the difference poses makes rotations longer. Compute the squared length that a
+    // Adding the difference poses makes rotations longer. This is the squared length that a
     // rotation of length kSmallestNorm may have afterwards.
     Float shortest = kSmallestNorm * kSmallestNorm;
     if (state.is_any) shortest = shortest * Float(1.01f * kLongestSlerp * kLongestSlerp);
@@ -152,7 +152,7 @@ bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
       least = Float(hn::Min(square.v, least.v));
       StoreQuat(UnitOf(q, square), unit);
     };
-    // Normalize each rotation while the next one is blended, because both have long latencies.
+    // Each rotation is normalized while the next one is blended, because both have long latencies.
     SoaQuat last = {half, half, half, half};
     float* to = rotations + lane;
     for (std::size_t joint = 0; joint < blend.joint_count; ++joint) {

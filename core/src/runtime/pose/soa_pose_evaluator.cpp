@@ -177,7 +177,7 @@ void SoaPoseEvaluator::Work::CollectDifferences() {
   for (std::size_t i = 0; i < lanes; ++i) {
     const Movement& of = movement(i);
     is_inertial_lane.of[i] = 0.0f;
-    // Once a difference pose has faded out, later poses do not need it either.
+    // If a difference pose has faded out, later poses do not need it either.
     if (samples[0].is_eased[i] == 0.0f) continue;
     is_eased = true;
     differences[i] = &of.difference.rotations[0].x;
@@ -318,7 +318,7 @@ void SoaPoseEvaluator::Prefetch(const SampleRun& run) {
 }
 
 void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs) {
-  // A block may contain only poses with planted feet or only poses without.
+  // All poses of a block must have planted feet, or none.
   for (const bool is_planted : {false, true}) {
     std::array<SampleRun, kBlock> runs;
     std::array<Pose*, kBlock> outputs;

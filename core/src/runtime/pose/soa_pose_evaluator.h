@@ -9,9 +9,9 @@
 
 namespace stridewire {
 
-/// Successive poses of one movement. A movement does not change once it has begun, so a server can
-/// evaluate several ticks at once. It then loads, blends and transposes the movement's data only
-/// once.
+/// Successive poses of one movement. A movement does not change after it has begun, so a server can
+/// evaluate several ticks at once. The data of the movement is then loaded, blended and transposed
+/// only once.
 struct SampleRun {
   /// Movement to evaluate. If its feet are planted, its FootPlan::packed must be set.
   const Movement* movement = nullptr;
@@ -22,14 +22,14 @@ struct SampleRun {
 };
 
 /// Evaluates up to SoaPose::kLanes sample runs side by side, with difference poses and planted
-/// feet. Each pose has the same bytes no matter which others are evaluated with it. Not
-/// thread-safe. Allocates in its constructor only.
+/// feet. The bytes of a pose do not depend on the other poses that are evaluated with it. Not
+/// thread-safe. Allocates only in its constructor.
 ///
 ///   evaluator.Begin(runs, count);
 ///   for (int i = 0; i < count; ++i) Use(evaluator.Next());
 class SoaPoseEvaluator {
  public:
-  /// `library` must outlive the evaluator. `max_count` is the largest number of poses per run, >=
+  /// `library` must outlive the evaluator. `max_count` is the maximum number of poses per run, >=
   /// 1.
   SoaPoseEvaluator(const MotionLibrary& library, int max_count);
   ~SoaPoseEvaluator();
@@ -39,7 +39,7 @@ class SoaPoseEvaluator {
   [[nodiscard]] int max_count() const;
 
   /// Starts the evaluation of `count` poses of at least one run. Either all movements have planted
-  /// feet or none. The movements must stay alive until the last pose has been evaluated.
+  /// feet or none. The movements must exist until the last pose has been evaluated.
   void Begin(std::span<const SampleRun> runs, int count);
   /// Returns the next pose of each run, in the lane of the run. Other lanes are undefined.
   [[nodiscard]] const SoaPose& Next();

@@ -13,8 +13,8 @@ bool IsFinite(const Vec3& v) {
 }
 
 // Catmull-Rom weights of the four samples around position `u`, in [0, 1), of the middle interval.
-// The sample before the first one is extrapolated linearly as 2 p_0 - p_1, and likewise at the end.
-// Its weight is added to the weights of the two samples that define it.
+// The sample before the first one is extrapolated linearly as 2 p_0 - p_1. Its weight is added to
+// the weights of the two samples that define it. The same applies at the end.
 struct CubicWeights {
   float w[4];
 
@@ -90,7 +90,7 @@ void SampleClip(const Clip& clip, double time_s, PoseSpan out) {
     out.root_position_m = source.root_position_m;
     std::copy(source.rotations.begin(), source.rotations.end(), out.rotations.begin());
   };
-  // At the time of a sample, return that sample unchanged to the last bit.
+  // At the time of a sample, returns that sample without any change.
   if (u <= 0.0f || last == 0) return copy(f1);
   if (u >= 1.0f) return copy(f1 + 1);
 
@@ -102,8 +102,8 @@ void SampleClip(const Clip& clip, double time_s, PoseSpan out) {
   out.root_position_m = k.w[0] * p0.root_position_m + k.w[1] * p1.root_position_m +
                         k.w[2] * p2.root_position_m + k.w[3] * p3.root_position_m;
   for (std::size_t j = 0; j < out.rotations.size(); ++j) {
-    // q and -q are the same rotation. Align the signs here, because callers may not have called
-    // MakeSignContinuous.
+    // q and -q are the same rotation. The signs are aligned here, because callers may not have
+    // called MakeSignContinuous.
     const Quat q1 = p1.rotations[j];
     const Quat q0 = Dot(p0.rotations[j], q1) < 0.0f ? -p0.rotations[j] : p0.rotations[j];
     const Quat q2 = Dot(p2.rotations[j], q1) < 0.0f ? -p2.rotations[j] : p2.rotations[j];

@@ -5,29 +5,30 @@ namespace stridewire {
 // Tuning constants of foot planting, shared by the scalar and the SIMD implementation. Names that
 // end in M are in metres.
 
-// Planting may extend a leg to kEasyExtension of its length, or as far as the blended pose extends
-// it, whichever is longer, but never beyond kLongestExtension of its length.
+// Planting may extend a leg to kEasyExtension of its length, or as far as in the blended pose if
+// that is longer. It never extends a leg beyond kLongestExtension of its length.
 inline constexpr double kEasyExtension = 0.995;
 inline constexpr double kLongestExtension = 0.9995;
 // Planting lowers the root if a leg would exceed that limit. A leg approaches the limit gradually.
-// It keeps its length up to kFreeExtension or, if longer, the extension of the blended pose. That
-// length and the limit are at least kLeastRoom apart. All are fractions of the leg's length.
+// It keeps its length up to kFreeExtension or, if longer, up to the extension of the blended pose.
+// The distance between that length and the limit is at least kLeastRoom. All are fractions of the
+// leg's length.
 inline constexpr double kFreeExtension = 0.965;
 inline constexpr double kLeastRoom = 0.001;
-// If the legs need lowerings a and b, the root is lowered by the larger one, smoothed with
-// kLowerOverlap * a * b.
+// If the legs require the root to be lowered by a and b, it is lowered by the larger value,
+// smoothed with kLowerOverlap * a * b.
 inline constexpr double kLowerOverlap = 0.1;
-// Smoothing distances of SmoothMax. They keep the root and the feet from changing speed abruptly
+// Smoothing distances of SmoothMax. They prevent abrupt changes of speed of the root and the feet
 // when a limit becomes active.
 inline constexpr double kSoftM = 0.002;
 inline constexpr double kSoftGroundM = 0.006;
-// Within kNearPrintM of a footprint (horizontally), soles are lifted fully out of its ground plane.
-// The lift fades to zero at kFarFromPrintM.
+// Within a horizontal distance of kNearPrintM from a footprint, soles are fully lifted out of its
+// ground plane. The lift fades to zero at kFarFromPrintM.
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
-// During a swing, the ground to stay above changes from that of the old footprint to that of the
-// new one. The change begins at kGroundBlendStart and takes kGroundBlendLength, as fractions of the
-// swing.
+// During a swing, the ground plane that limits the foot changes from that of the old footprint to
+// that of the new one. The change begins at kGroundBlendStart and takes kGroundBlendLength, as
+// fractions of the swing.
 inline constexpr double kGroundBlendStart = 0.3;
 inline constexpr double kGroundBlendLength = 0.4;
 // A foot that lands lower than it started descends after this fraction of the swing. A foot that
@@ -36,34 +37,36 @@ inline constexpr double kSinkStart = 0.35;
 // The root of a body that steps down descends after this fraction of the movement. If it descended
 // earlier, it would bend the knee of the leg that swings above the higher tread.
 inline constexpr double kRootSinkStart = 0.25;
-// A foot tilts with the slope of the ground that it stands on, but in the middle of a swing only by
-// this share of the slope. Otherwise, the ankle of a bent leg would bend too far on ramps.
+// A foot tilts with the slope of the ground on which it stands. In the middle of a swing, it tilts
+// only by this fraction of the slope. Otherwise, the ankle of a bent leg would bend too far on
+// ramps.
 inline constexpr double kSwingTilt = 0.4;
-// Fraction of the swing at which its tilt begins to grow to that of the footprint. A foot that
-// lands has its toes up already, so the slope of a ramp is added late.
+// Fraction of the swing at which its tilt begins to change to that of the footprint. The toes of a
+// landing foot are already raised, so the slope of a ramp is added late.
 inline constexpr double kLandingTiltStart = 0.75;
 // A curve that rises from 0 to 1, stays there and falls back to 0, at fractions of the swing.
 struct LiftCurve {
   double begin, top, falls, end;
 };
-// Curves of the extra lifts of a foot early, in the middle and late in its swing. One curve for the
-// whole swing would lift a foot that grazes the edge of a tread at its start or end far too high.
+// Curves of the additional lifts of a foot early, in the middle and late in its swing. If the foot
+// grazes the edge of a tread at the start or end of the swing, a single curve for the whole swing
+// would lift it far too high.
 inline constexpr LiftCurve kLiftCurves[3] = {
     {0.0, 0.22, 0.22, 0.6}, {0.0, 0.35, 0.65, 1.0}, {0.4, 0.78, 0.78, 1.0}};
-// Flatness (LegPose::Flatness) of a standing foot at which its heading lock is zero (kHeelUp) and
-// at which it is complete (kSoleDown).
+// Flatness (LegPose::Flatness) of a standing foot at which its heading lock has no effect (kHeelUp)
+// and its full effect (kSoleDown).
 inline constexpr double kHeelUp = 0.5;
 inline constexpr double kSoleDown = 0.8;
-// Angle between the direction from ankle to ball and the footprint at which the lock is complete
-// (kAheadRad) and at which it is zero (kReversedRad).
+// Angle between the direction from ankle to ball and the footprint at which the lock has its full
+// effect (kAheadRad) and no effect (kReversedRad).
 inline constexpr double kAheadRad = 1.0;
 inline constexpr double kReversedRad = 2.0;
 
 // A leg with a shorter thigh or shank cannot be planted.
 inline constexpr float kSmallestBoneM = 1e-3f;
-// The axis of a knee is the normal of the leg's plane once the sine of the knee's bend exceeds
+// The axis of a knee is the normal of the leg's plane if the sine of the knee's bend exceeds
 // kBentSine. A straighter knee has no reliable plane, so the knee's hinge (LegRig::Side::hinge) is
-// mixed in with weight kReferenceWeight; below kStraightSine it has its full weight.
+// added with weight kReferenceWeight. Below kStraightSine it has its full weight.
 inline constexpr float kStraightSine = 0.04f;
 inline constexpr float kBentSine = 0.14f;
 inline constexpr float kReferenceWeight = 0.1f;

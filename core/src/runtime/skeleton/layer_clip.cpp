@@ -10,7 +10,7 @@ namespace stridewire {
 namespace {
 
 // The four keys around a time and their Catmull-Rom weights. A clip that does not loop repeats its
-// first and last key beyond its ends, which only slows the motion down there.
+// first and last key beyond its ends, so the motion slows down there.
 struct KeyBlend {
   std::array<std::size_t, 4> frames;
   std::array<float, 4> weights;
@@ -23,7 +23,7 @@ struct KeyBlend {
     } else {
       position = std::clamp(position, 0.0, count - 1.0);
     }
-    // Rounding may result in `count`.
+    // Due to rounding, the result may be `count`.
     const auto key = std::min(std::floor(position), count - 1.0);
     const auto u = static_cast<float>(std::min(position - key, 1.0));
     for (int i = 0; i < 4; ++i) {
@@ -83,7 +83,8 @@ void ApplyLayer(const LayerClip& clip, double time_s, double weight, PoseSpan po
       const float* q = &clip.rotations[(blend.frames[k] * count + i) * 4];
       return Quat(q[3], q[0], q[1], q[2]);
     };
-    // q and -q are the same rotation: choose the signs that make neighbouring keys closest.
+    // q and -q are the same rotation. The signs are chosen so that neighbouring keys are closest to
+    // each other.
     const Quat q1 = key(1);
     Quat q0 = key(0);
     Quat q2 = key(2);

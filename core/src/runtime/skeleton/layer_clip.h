@@ -12,15 +12,15 @@
 namespace stridewire {
 
 inline constexpr int kMaxLayerClips = 64;  ///< Per library.
-/// Frames per clip: ten minutes at 30 frames per second.
+/// Maximum number of frames per clip: ten minutes at 30 frames per second.
 inline constexpr int kMaxLayerFrames = 18'000;
 inline constexpr std::size_t kMaxLayerNameBytes = 32;
 inline constexpr double kMinLayerFps = 1.0;
 inline constexpr double kMaxLayerFps = 240.0;
 
-/// A clip for part of the body that is played on top of any movement of the legs, such as waving or
-/// carrying. Its mask has one weight per joint; joints that are not listed have weight 0. Spans
-/// point into the library's bytes.
+/// A clip for a part of the body that is played on top of any movement of the legs, for example
+/// waving or carrying. Its mask has one weight per joint. Joints that are not listed have weight 0.
+/// Spans point into the library's bytes.
 struct LayerClip {
   std::string_view name;  ///< Satisfies IsLayerName().
   /// Source of the clip, for example "wave.bvh 1.00-2.50 s".
@@ -36,7 +36,7 @@ struct LayerClip {
   [[nodiscard]] int frame_count() const {
     return static_cast<int>(rotations.size() / (4 * joints.size()));
   }
-  /// Returns the length of one loop, or the time from the first to the last key.
+  /// Returns the duration of one loop, or the time from the first to the last key.
   [[nodiscard]] double duration_s() const {
     return (is_looping ? frame_count() : frame_count() - 1) / fps;
   }
@@ -53,7 +53,7 @@ struct LayerClip {
 /// Rotates the joints of `pose` towards the clip at `time_s`: r slerp(1, r^-1 c, weight * mask),
 /// along the short arc. The clip is C1 between its keys (Catmull-Rom). The time wraps around in a
 /// loop and is clamped in other clips. `weight` is in [0, 1]. Never allocates. Joints outside the
-/// mask keep their bits.
+/// mask do not change.
 void ApplyLayer(const LayerClip& clip, double time_s, double weight, PoseSpan pose);
 
 }  // namespace stridewire

@@ -29,7 +29,7 @@ Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Vec3& reference) {
   const Vec3 plane = glm::cross(thigh, shank) / scale;
   const float sine = std::sqrt(glm::dot(plane, plane));
   const float s = std::clamp((kBentSine - sine) / (kBentSine - kStraightSine), 0.0f, 1.0f);
-  // Treat a knee that is bent backward as straight.
+  // A knee that is bent backward is treated as straight.
   const float forward = glm::dot(plane, reference) < 0.0f ? 0.0f : 1.0f;
   const float weight = forward > 0.0f ? s * s * (3.0f - 2.0f * s) : 1.0f;
   return forward * plane + kReferenceWeight * weight * reference;
@@ -141,7 +141,7 @@ double LegPose::Flatness(const LegRig::Side& side) const {
   return std::sqrt(static_cast<double>(foot.x) * foot.x + foot.z * foot.z) / side.foot_m;
 }
 
-// Toes give way by this much before they lift the foot.
+// The toes bend by this much before they lift the foot.
 constexpr double kSoftToeM = 0.005;
 
 double LegPose::LowestSole(const LegRig::Side& side) const {
@@ -187,12 +187,12 @@ void SolveLeg(const LegRig& rig, Foot foot, const LegPose& leg, const Vec3& ankl
   const float d = std::clamp(distance, shortest, kMaxLegExtension * (l1 + l2));
 
   // The knee is at distance `a` along the line from hip to ankle and at distance `h` off that line,
-  // in the plane of the knee.
+  // in the plane of the leg.
   const float a = (l1 * l1 - l2 * l2 + d * d) / (2.0f * d);
   const float h = std::sqrt(std::max(0.0f, l1 * l1 - a * a));
   Vec3 pole = glm::cross(u, KneeAxis(thigh, shank, leg.world_rotations[hip] * side.hinge));
   const float pole_length = std::sqrt(glm::dot(pole, pole));
-  // A leg that points along its own knee axis has no plane, so any direction is as good.
+  // If a leg points along its own knee axis, it has no plane, so any direction can be used.
   pole = pole_length > 1e-6f ? pole / pole_length : Vec3(0.0f, 0.0f, 1.0f);
   const Vec3 new_thigh = a * u + h * pole;
   const Vec3 new_shank = d * u - new_thigh;

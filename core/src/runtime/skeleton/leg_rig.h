@@ -8,7 +8,8 @@
 
 namespace stridewire {
 
-inline constexpr int kMaxLegChain = 32;  ///< Legs with longer chains are not planted.
+/// Maximum number of joints in the chain of a leg. Longer legs are not planted.
+inline constexpr int kMaxLegChain = 32;
 
 /// Properties of a skeleton's legs that planting needs, computed once per library.
 struct LegRig {
@@ -27,14 +28,14 @@ struct LegRig {
     double ankle_height_m = 0.0;  ///< Height of the ankle above the ground in the stand pose.
     /// Direction from ankle to ball in the stand pose, relative to its heading.
     double toe_out_rad = 0.0;
-    /// Height of the tip of the toes above the ground in the stand pose.
+    /// Height of the toe tip above the ground in the stand pose.
     double toe_height_m = 0.0;
     /// Position of the heel in the frame of the ankle: below and behind it, as high as the ball.
     Vec3 heel_m = Vec3(0.0f);
-    double toe_m = 0.0;   ///< Horizontal distance from the ball to the tip of the toes.
+    double toe_m = 0.0;   ///< Horizontal distance from the ball to the toe tip.
     double foot_m = 0.0;  ///< Horizontal distance from the ankle to the ball in the stand pose.
   };
-  /// A side and its offsets in flat arrays, for the planting kernels.
+  /// The data of a side and its offsets in flat arrays, for the planting kernels.
   struct Bones {
     std::size_t count = 0;               ///< Number of joints in the chain.
     std::size_t joints[kMaxLegChain]{};  ///< [index in chain]
@@ -46,7 +47,7 @@ struct LegRig {
     std::size_t knee = 0;
     std::size_t ankle = 0;
     float ball_m[3]{};     ///< Position of the ball in the frame of the last joint.
-    float toe_tip_m[3]{};  ///< Position of the tip of the toes in the frame of the last joint.
+    float toe_tip_m[3]{};  ///< Position of the toe tip in the frame of the last joint.
     float heel_m[3]{};     ///< Position of the heel in the frame of the ankle.
     float hinge[3]{};      ///< Hinge axis of the knee in the frame of the hip joint.
     float thigh_m = 0.0f;
@@ -60,10 +61,11 @@ struct LegRig {
   std::array<Side, 2> sides;   ///< [foot]
   std::array<Bones, 2> bones;  ///< [foot]: bones of the leg; set if the rig is usable.
   static constexpr std::size_t kMaxJointsOfLegs = 2 * kMaxLegChain - 1;
-  /// Joints of both chains, in increasing order, the root first. Set if usable.
+  /// Joints of both chains in increasing order, which starts with the root. Set if the rig is
+  /// usable.
   std::vector<int> joints;
   /// True if each leg is a chain of hip, knee, ankle and ball with bones of positive length.
-  /// Otherwise feet are not planted.
+  /// Otherwise, feet are not planted.
   bool is_usable = false;
 
   [[nodiscard]] const Side& side(Foot foot) const { return sides[static_cast<std::size_t>(foot)]; }
@@ -78,8 +80,8 @@ inline constexpr double kSoleBehindAnkleM =
 [[nodiscard]] LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
                                 const std::array<Vec3, 2>& knee_hinges);
 
-/// A leg of a pose, from forward kinematics along its chain. Positions are relative to the root, in
-/// world axes, so that floats stay precise far from the origin.
+/// A leg of a pose, computed by forward kinematics along its chain. Positions are relative to the
+/// root, in world axes, so that floats stay precise far from the origin.
 struct LegPose {
   std::array<Vec3, kMaxLegChain> positions_m;      ///< [index in chain]
   std::array<Quat, kMaxLegChain> world_rotations;  ///< [index in chain]
@@ -89,14 +91,15 @@ struct LegPose {
 
   /// Returns the heading of the foot: the direction from ankle to ball.
   [[nodiscard]] double FootHeading(const LegRig::Side& side) const;
-  /// Returns the horizontal fraction of the foot's length: 1 with the sole on the ground as in the
-  /// stand pose, less with the heel up, and 0 if the ball is at the ankle.
+  /// Returns the horizontal length of the foot as a fraction of that in the stand pose: 1 with the
+  /// sole on the ground, less with the heel up, and 0 if the ball is at the ankle.
   [[nodiscard]] double Flatness(const LegRig::Side& side) const;
-  /// Returns the height of the foot relative to the root, minus its height above the ground in the
-  /// stand pose, at that point of ankle, ball and tip of the toes where the difference is smallest.
-  /// The tip of the toes may be a little lower.
-  /// If the root is at height y, a foot that stands on level ground at height g has
-  /// y + LowestSole = g, also while it rolls over the heel or the toes.
+  /// Returns the smallest difference, among ankle, ball and toe tip, between the height of the
+  /// point relative to the root and its height above the ground in the stand pose. The toe tip may
+  /// be a little lower.
+  ///
+  /// If the root is at height y, a foot that stands on level ground at height g has y + LowestSole
+  /// = g, even while it rolls over the heel or the toes.
   [[nodiscard]] double LowestSole(const LegRig::Side& side) const;
 };
 
@@ -104,10 +107,10 @@ void EvaluateLeg(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose
                  LegPose& out);
 
 /// Moves the ankle of a leg to `ankle_m` (relative to the root) with world rotation
-/// `ankle_rotation`, by two-bone inverse kinematics in the plane of the knee in `leg`. The knee
-/// never bends backward. A target further away than kMaxLegExtension times the length of the leg is
-/// approached as far as that. Writes the rotations of hip, knee and ankle. Uses square roots and
-/// divisions only.
+/// `ankle_rotation`, by two-bone inverse kinematics in the plane of `leg`. The knee never bends
+/// backward. If the target is further away than kMaxLegExtension times the leg length, the leg
+/// extends to that length. Writes the rotations of hip, knee and ankle. Uses only square roots and
+/// divisions, no trigonometry.
 void SolveLeg(const LegRig& rig, Foot foot, const LegPose& leg, const Vec3& ankle_m,
               const Quat& ankle_rotation, PoseSpan pose);
 
