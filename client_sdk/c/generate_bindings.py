@@ -81,7 +81,7 @@ def enumerators(body):
 
 
 def pointers(c_type):
-    """Splits a C type into its name and the number of its stars."""
+    """Splits a C type into its name and the number of its asterisks."""
     name = c_type.replace("const ", "").replace(" ", "")
     return name.rstrip("*"), name.count("*")
 
@@ -146,7 +146,7 @@ def documentation(text, indent):
 
 
 def csharp_enum(name, values):
-    """Writes an enum. Its values lose the prefix that they share."""
+    """Writes an enum. The common prefix of its values is removed."""
     parts = [value.split("_") for value, _, _ in values]
     shared = 0
     while all(len(words) > shared + 1 and words[shared] == parts[0][shared] for words in parts):
@@ -213,7 +213,7 @@ def csharp_bindings(api, sizes):
 
 
 def struct_sizes(api, bindings):
-    """Returns the size of each struct by the rules of the C compiler."""
+    """Computes the size of each struct according to the rules of the C compiler."""
     names = {}
     exec(bindings, names)
     return {name: ctypes.sizeof(names[name]) for name in api.structs}

@@ -63,7 +63,8 @@ class GameServer {
   bool Handle(const stridewire_event& event) {
     switch (event.type) {
       case STRIDEWIRE_EVENT_WORLD_JOINED:
-        // Avatars are spawned once only: after a lost session the client library spawns them again.
+        // Avatars are spawned only once. After a lost session, the client library spawns them
+        // again.
         if (!spawned_) Spawn();
         break;
       case STRIDEWIRE_EVENT_REPLY:
@@ -74,7 +75,7 @@ class GameServer {
         }
         break;
       case STRIDEWIRE_EVENT_ITEM:
-        // The library has no jumps, so stop requesting them.
+        // The library has no jumps, so the program stops requesting them.
         if (event.status == STRIDEWIRE_NO_MOVEMENT) can_jump_ = false;
         refused_ += event.status != STRIDEWIRE_OK;
         break;
@@ -85,7 +86,7 @@ class GameServer {
         }
         break;
       case STRIDEWIRE_EVENT_IDLE:
-        // Ignore an idle event from before the server accepted the last request.
+        // Ignores an idle event from before the server accepted the last request.
         if (IsOurs(event.avatar) && last_requests_[event.avatar] == 0) RequestMovements(event);
         break;
       case STRIDEWIRE_EVENT_STARTED:
@@ -134,8 +135,8 @@ class GameServer {
     spawned_ = static_cast<bool>(client_.Spawn(world_, spawns));
   }
 
-  // Returns the turn of each of `steps` steps: random, or towards the start if the avatar is too
-  // far away.
+  // Returns the turns of `steps` steps: random ones, or towards the start if the avatar is too far
+  // away.
   double Turn(const stridewire_event& event, int steps) {
     const double x = 0.75 * (settings_.avatars - 1) - event.base_position_m[0];
     const double z = -event.base_position_m[2];
@@ -158,7 +159,7 @@ class GameServer {
     for (int i = 0; i < steps; ++i) {
       const double varied_m = length_m * Random(0.9, 1.1);
       const double step_m = std::clamp(varied_m, settings_.step_m[0], settings_.step_m[1]);
-      // The lengths are random, so the nearest movement of the library is as good.
+      // The lengths are random, so the nearest movement of the library is good enough.
       movements.push_back(AllowNearest(Step(avatar, ++request_id_, step_m, turn_rad)));
     }
     movements.push_back(Stand(avatar, ++request_id_, Random(0.3, 1.0)));

@@ -34,13 +34,13 @@ int main(int argc, char** argv) {
   const auto end = start + std::chrono::duration<double>(seconds);
   for (auto next = start; next < end; next += std::chrono::milliseconds(100)) {
     double wait_s = 0.0;
-    do {  // Handle events for a tenth of a second.
+    do {  // Handles events for a tenth of a second.
       while (client->PollEvent(event)) {
         std::printf("event %d: %s\n", event.type,
                     event.text[0] != '\0' ? event.text : stridewire_status_name(event.status));
-        // Wait until the avatar is idle, and then request more movements.
+        // Waits until the avatar is idle, and then requests more movements.
         if (event.type != STRIDEWIRE_EVENT_IDLE) continue;
-        std::vector<stridewire_movement> movements;  // Request four steps and a pause.
+        std::vector<stridewire_movement> movements;  // Four steps and a pause.
         for (int i = 0; i < 4; ++i) movements.push_back(Step(avatar, ++request, 0.55));
         movements.push_back(Stand(avatar, ++request, 0.5));
         (void)client->Request(world, movements);

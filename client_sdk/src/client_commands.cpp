@@ -247,7 +247,8 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
     protocol::SetLayers message;
     message.items.reserve(count);
     for (const stridewire_layer& l : std::span(layers, count)) {
-      // Copies at most one byte more than a name may have: a longer name is rejected in any case.
+      // Copies at most one byte more than a name may have, because a longer name is rejected in any
+      // case.
       message.items.push_back({.avatar = l.avatar,
                                .layer = {l.name, strnlen(l.name, protocol::kMaxNameBytes + 1)},
                                .fade_out = l.fade_out != 0,

@@ -41,7 +41,7 @@ stridewire_status Query(stridewire_client* client, const Call& call) {
   }
 }
 
-/// Same as Query, and then wakes the network thread, which sends what the call has queued.
+/// Same as Query, but then wakes the network thread, which sends what the call has queued.
 template <typename Call>
 stridewire_status Change(stridewire_client* client, const Call& call) {
   const stridewire_status status = Query(client, call);

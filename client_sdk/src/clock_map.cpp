@@ -13,8 +13,8 @@ void ClockMap::AddSample(double local_s, double server_s) {
   const auto number = static_cast<std::int64_t>(std::floor(local_s / kBucketS));
 
   if (ready_ && std::abs(offset_s - target_offset_s_) > kSnapS) {
-    // A much larger offset may be a single late message, so the window decides. A much smaller
-    // offset cannot be explained by delays: the server's clock has changed.
+    // A much larger offset may be a single late message, so the window determines the result. A
+    // much smaller offset cannot be caused by delays: the server's clock has changed.
     if (offset_s < target_offset_s_) Reset();
   }
   Bucket& bucket = buckets_[static_cast<std::size_t>(number % kBuckets + kBuckets) % kBuckets];

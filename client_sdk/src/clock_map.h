@@ -10,15 +10,15 @@ namespace stridewire::client {
 /// If a message with server time s arrives at local time l, the offset l - s is the difference of
 /// the clocks plus the delay of the message. Delays are never negative, so the smallest offset of
 /// the last kWindowS is the best estimate. The map approaches it at a rate of at most kSlew, so
-/// that the mapped time neither jumps nor runs backwards. It jumps in two cases only: if the
-/// estimate changes by more than kSnapS, which means that the server's clock has changed, and for
-/// smaller offsets during the first kSettleS.
+/// that the mapped time neither jumps nor runs backwards. It jumps in two cases only. In the first,
+/// the estimate changes by more than kSnapS, which means that the server's clock has changed. In
+/// the second, a smaller offset arrives during the first kSettleS.
 class ClockMap {
  public:
   static constexpr int kBuckets = 8;
   static constexpr double kBucketS = 0.5;
   static constexpr double kWindowS = kBuckets * kBucketS;
-  /// Largest rate of change of the offset, in seconds per second.
+  /// Maximum rate of change of the offset, in seconds per second.
   static constexpr double kSlew = 0.02;
   static constexpr double kSnapS = 0.25;
   static constexpr double kSettleS = 1.0;

@@ -11,7 +11,7 @@ namespace stridewire::client {
 
 /// Properties of a sampled pose.
 enum CrowdFlags : std::uint8_t {
-  /// The last received pose at or before the sampled time does not continue the previous one.
+  /// The last received pose at or before the sampled time does not continue the pose before it.
   kCrowdDiscontinuity = 1,
   kCrowdStanding = 2,       ///< The avatar stands and its queue is empty.
   kCrowdHeld = 4,           ///< The pose does not move, because no continuous pose follows.
@@ -29,7 +29,7 @@ enum CrowdFlags : std::uint8_t {
                                    (stamp.standing ? kCrowdStanding : 0) | detail);
 }
 
-/// Poses of many avatars at one time, in ascending order of the avatars. Keeps its memory.
+/// Poses of many avatars at one time, in ascending order of avatar ids. Reuses its memory.
 struct CrowdPose {
   std::size_t joint_count = 0;
   std::vector<protocol::AvatarId> avatars;

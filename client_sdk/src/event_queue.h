@@ -9,8 +9,8 @@
 
 namespace stridewire::client {
 
-/// Events that the application has not polled yet. A full queue drops its oldest event and reports
-/// the number of dropped events in the next event that is taken.
+/// Events that the application has not polled yet. A full queue drops its oldest event. The next
+/// event that is taken contains the number of dropped events.
 class EventQueue {
  public:
   /// Creates an empty queue. `capacity` must be above 0.

@@ -35,7 +35,7 @@ HWY_INLINE Rotations Load(Tag d, const float* from, std::size_t count) {
   return q;
 }
 
-// The same order of sums as Dot in base/math.h.
+// The order of the sums is that of Dot in base/math.h.
 HWY_INLINE Vec Dot(const Rotations& a, const Rotations& b) {
   return hn::Add(hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z)),
                  hn::Mul(a.w, b.w));
@@ -70,7 +70,7 @@ void InterpolateRotations(const RotationKeys& keys, std::size_t count, float* ou
     Rotations q = {
         blend(before.x, start.x, end.x, beyond.x), blend(before.y, start.y, end.y, beyond.y),
         blend(before.z, start.z, end.z, beyond.z), blend(before.w, start.w, end.w, beyond.w)};
-    // As Normalise in base/math.h: the identity if the sum has no direction.
+    // As in Normalise in base/math.h, the result is the identity if the sum has no direction.
     const auto norm = hn::Sqrt(Dot(q, q));
     const auto is_usable = hn::Gt(norm, hn::Set(d, 1e-12f));
     q.x = hn::IfThenElseZero(is_usable, hn::Div(q.x, norm));

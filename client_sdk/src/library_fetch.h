@@ -19,19 +19,19 @@ namespace stridewire::client {
 struct LibraryTask {
   std::string hash;
   std::string folder;  ///< Folder of the cache. Empty: no cache.
-  /// Bytes to verify and to store in the folder. Empty: open the file in the folder instead.
+  /// File to verify and to store in the folder. Empty: open the file in the folder instead.
   std::vector<std::byte> file;
 };
 
 /// Runs a task and returns the library. Fails with kNotFound if the folder has no intact file of
-/// that hash, and with kMalformed if `file` is not a library of that hash. A file that cannot be
-/// stored is not an error. Files are named HASH.swl; they are written under another name and
-/// renamed when complete.
+/// that hash, and with kMalformed if `file` is not a library with that hash. If a file cannot be
+/// stored, that is not an error. Files are named HASH.swl. They are written under a temporary name
+/// and renamed when they are complete.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> RunLibraryTask(
     const LibraryTask& task);
 
-/// Gets libraries from a folder or from the server. It requests one piece at a time. It uses
-/// neither disk nor socket itself: the owner runs its tasks and sends its requests.
+/// Gets libraries from a folder or from the server, one piece at a time. It accesses neither disk
+/// nor socket itself. Instead, its owner runs its tasks and sends its requests.
 ///
 ///   Get -> kToOpen -> kOpening -> kReady                        the folder has the library
 ///                            `--> kFetching -> kToVerify -> kVerifying -> kReady
@@ -43,16 +43,17 @@ class LibraryFetch {
 
   explicit LibraryFetch(std::string folder) : folder_(std::move(folder)) {}
 
-  /// Returns the library, or null while it is being fetched. Returns the error if the last attempt
-  /// has failed; the next call starts a new attempt.
+  /// Returns the library, or null while it is being fetched. If the last attempt has failed,
+  /// returns its error, and the next call starts a new attempt.
   [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Get(const std::string& hash);
 
   /// Returns the next task, if any. Report its result with OnTask.
   [[nodiscard]] std::optional<LibraryTask> TakeTask();
   void OnTask(const std::string& hash, Expected<std::shared_ptr<const MotionLibrary>> result);
 
-  /// Returns the next request to the server, if any and if none is pending. Requests only libraries
-  /// for which `may_request` returns true. Report the answer with OnPiece.
+  /// Returns the next request to the server, unless a request is pending or nothing is left to
+  /// request. Requests only libraries for which `may_request` returns true. Report the answer with
+  /// OnPiece.
   [[nodiscard]] std::optional<protocol::FetchLibrary> TakeRequest(
       const std::function<bool(const std::string& hash)>& may_request);
   void OnPiece(const protocol::LibraryPiece& piece);

@@ -26,7 +26,7 @@ constexpr std::size_t kReadBytes = std::size_t{256} << 10;
 }  // namespace
 
 struct NetworkThread::Impl {
-  /// An attempt to connect, and the resulting connection. Its handlers keep it alive.
+  /// An attempt to connect, and the resulting connection. Pending handlers keep it alive.
   struct Connection {
     explicit Connection(asio::io_context& io, std::uint64_t n)
         : number(n), resolver(io), socket(io), input(kReadBytes) {}

@@ -11,7 +11,7 @@
 
 namespace stridewire::client {
 
-/// Sends and receives the bytes of a Session over TCP on a thread of its own. It holds the mutex
+/// Sends and receives the bytes of a Session over TCP on a separate thread. It holds the mutex
 /// whenever it uses the session, and never during a blocking system call.
 class NetworkThread {
  public:
@@ -30,11 +30,11 @@ class NetworkThread {
     [[nodiscard]] std::string Text() const;
   };
 
-  /// Sets the servers for the next attempts to connect, by the session's index of addresses. The
-  /// caller holds the mutex. `targets` must not be empty.
+  /// Sets the servers for the next attempts to connect. Session::address_index is an index in
+  /// `targets`, which must not be empty. The caller must hold the mutex.
   void SetTargets(std::vector<Target> targets);
 
-  /// Makes the thread process the session soon. Callable from any thread.
+  /// Makes the thread process the session soon. May be called from any thread.
   void Wake();
 
   /// Returns the seconds since the construction, on a clock that never decreases.

@@ -30,7 +30,7 @@ void PlayoutClock::Store(const Offset& offset) {
   if (count_ > 0) {
     Offset& last = offsets_[(first_ + count_ - 1) % kMaxOffsets];
     if (last.server_s == offset.server_s) {
-      last = offset;  // It is the larger one, because it arrived later.
+      last = offset;  // Of two messages with the same server time, the later one counts.
       return;
     }
   }

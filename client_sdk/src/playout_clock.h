@@ -7,51 +7,53 @@ namespace stridewire::client {
 
 /// Determines which server time to display, so that poses arrive just before they are displayed.
 ///
-/// A message with server time s that arrives at local time l has the offset l - s. The display
-/// shows server time l - d at local time l. It is not ahead of the newest pose if d is at least the
-/// offset of the next message plus the interval of the messages:
+/// A message with server time s that arrives at local time l has the offset l - s. At local time l,
+/// the display shows server time l - d. It is not ahead of the newest pose if d is at least the
+/// offset of the next message plus the interval of the messages. The target of d is therefore
 ///
-///   target = offset that kQuantile of the last kWindowS do not exceed + (1 + kMargin) * interval
+///   the kQuantile-quantile of the offsets of the last kWindowS + (1 + kMargin) * interval
 ///
-/// d approaches the target at a rate of at most kMaxRate, so that the display runs at most 5 %
-/// faster or slower than the server. It jumps only if the server's clock has changed, or if all
-/// messages of the last kResyncS arrived too late by more than kSnapS.
+/// d approaches the target at a rate of at most kMaxRate, so the display runs at most 5 % faster or
+/// slower than the server. It jumps only if the server's clock has changed, or if all messages of
+/// the last kResyncS arrived too late by more than kSnapS.
 ///
-/// A delay cannot cover a stall of the link. The messages that arrive after one do not count until
-/// they are on time again.
+/// No delay can cover a stall of the link. The messages that arrive after a stall are therefore
+/// ignored until they are on time again.
 class PlayoutClock {
  public:
   static constexpr double kWindowS = 1.5;
-  /// Largest number of offsets in the window. With more ticks per second, it is shorter.
+  /// Maximum number of offsets in the window. If there are more ticks per second, the window is
+  /// shorter.
   static constexpr std::size_t kMaxOffsets = 256;
-  /// Part of a normal distribution that exceeds its mean by at most two standard deviations.
+  /// Fraction of a normal distribution that exceeds its mean by at most two standard deviations.
   static constexpr double kQuantile = 0.977;
-  /// Largest difference between the speeds of the display and of the server.
+  /// Maximum difference between the speeds of the display and of the server, as a fraction.
   static constexpr double kMaxRate = 0.05;
   /// Close to the target, the difference decays with this time constant.
   static constexpr double kDecayS = 0.25;
-  /// Part of an interval that is added to the delay.
+  /// Fraction of an interval that is added to the delay.
   static constexpr double kMargin = 0.25;
   /// Delay after the first message, until the window is full.
   static constexpr double kFirstDelayS = 0.1;
-  /// A longer pause between messages is a stall, if it exceeds three intervals.
+  /// Minimum pause between messages that counts as a stall. It must also exceed three intervals.
   static constexpr double kStallS = 0.4;
   static constexpr double kResyncS = 1.0;
-  /// If an offset is smaller than all others of the window by more than this, the server's clock
+  /// If an offset is smaller than all others in the window by more than this, the server's clock
   /// has changed, or the local clock was stopped.
   static constexpr double kSnapS = 0.25;
 
-  /// Adds a message with poses of server time `server_s` that arrived at `local_s`, from a stream
-  /// with this interval. Local times never decrease. Returns true if the displayed time jumped.
+  /// Adds a message with poses of server time `server_s` that arrived at `local_s`. The stream has
+  /// the interval `interval_s`. Local times never decrease. Returns true if the displayed time
+  /// jumped.
   bool AddSample(double local_s, double server_s, double interval_s);
 
-  /// Must be called after a lost connection. It counts as a stall.
+  /// Must be called after a lost connection, which counts as a stall.
   void OnStall(double local_s);
 
   [[nodiscard]] bool ready() const { return ready_; }
   /// Returns the server time to display at `local_s`. Requires ready().
   [[nodiscard]] double DisplayTime(double local_s) const { return local_s - OffsetAt(local_s); }
-  /// Difference between the target of `d` and its value at `local_s`. Requires ready().
+  /// Returns the target of `d` minus its value at `local_s`. Requires ready().
   [[nodiscard]] double MissingDelay(double local_s) const { return target_s_ - OffsetAt(local_s); }
   [[nodiscard]] double interval_s() const { return interval_s_; }
 
@@ -68,7 +70,7 @@ class PlayoutClock {
   void Start(double local_s, double offset_s);
   void Store(const Offset& offset);
 
-  /// The last offsets, one per server time. A tick may consist of several messages.
+  /// The last offsets, one per server time, because a tick may consist of several messages.
   std::array<Offset, kMaxOffsets> offsets_;
   std::size_t first_ = 0;
   std::size_t count_ = 0;

@@ -32,7 +32,7 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
       correction_.state = Correction::State::kNone;
       if (displayed_s_ < this->stamp(0).time_s) displayed_s_ = kNever;
     } else if (displayed_s_ > newest.time_s && correction_.state != Correction::State::kPending) {
-      // The curve after the newest pose changes, although it was displayed.
+      // The curve after the newest pose changes, although it has been displayed.
       Vec3 root_m;
       if (Sample(displayed_s_, root_m, displayed_)) {
         correction_.state = Correction::State::kPending;
@@ -58,8 +58,8 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
   return true;
 }
 
-// Poses are usually sampled shortly before the newest one and arrive at equal intervals. Searching
-// from there reads less memory than a binary search.
+// Returns the first pose after a time. Poses are usually sampled shortly before the newest one and
+// arrive at equal intervals, so a search that starts there reads less memory than a binary search.
 std::size_t PoseHistory::FirstAfterTime(double time_s) const {
   // Written this way so that NaN yields the newest pose.
   if (size_ == 0 || !(time_s < stamp(size_ - 1).time_s)) return size_;
@@ -227,7 +227,7 @@ std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3
   const std::size_t j = after;
 
   const bool exact = stamp(i).time_s == time_s;
-  // After a break of the connection, what was displayed before the next pose arrived continues.
+  // After an interruption of the connection, the motion that was displayed before continues.
   const double before_s = i > 0 ? stamp(i).time_s - stamp(i - 1).time_s : 0.0;
   const bool is_last =
       j == size_ || (stamp(j).discontinuity && stamp(j).time_s - stamp(i).time_s > 1.5 * before_s);
@@ -242,7 +242,7 @@ std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3
     return Sampled{i, exact};
   }
 
-  // If a neighbour is missing, i or j takes its place, which results in the secant of the interval.
+  // If a neighbour is missing, i or j replaces it, which results in the secant of the interval.
   const std::size_t before = i > 0 && !stamp(i).discontinuity ? i - 1 : i;
   const bool has_beyond =
       j + 1 < size_ && !stamp(j + 1).discontinuity && slope_is_before_[Slot(j)] == 0;

@@ -15,14 +15,14 @@
 namespace stridewire::client {
 
 /// Four poses for cubic interpolation in an interval: before it, at its start, at its end, and
-/// after it. If there is no pose before or after the interval, use the start or the end again.
+/// after it. If there is no pose before or after the interval, use the start or the end instead.
 struct PoseKeys {
   std::array<double, 4> times_s;
   ConstPoseSpan before;
   ConstPoseSpan start;
   ConstPoseSpan end;
   ConstPoseSpan beyond;
-  /// True: the slope at the start is that of the interval before it, instead of the secant from
+  /// True: the slope at the start is that of the interval before it. False: it is the secant from
   /// `before` to `end`.
   bool start_slope_is_before = false;
 };
@@ -33,17 +33,17 @@ struct PoseKeys {
 void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
                      std::span<Quat> rotations);
 
-/// Jitter buffer: the last poses of one avatar, the oldest first. It allocates in its constructor
-/// only. A full buffer drops its oldest pose.
+/// Jitter buffer: the last poses of one avatar, oldest first. Allocates only in its constructor. A
+/// full buffer drops its oldest pose.
 ///
-/// What is displayed is continuous, whenever poses arrive:
-///   - A curve through the poses is not changed after its display has begun. The slope at a pose
-///     is the secant through both neighbours. If an interval is displayed before the pose after it
-///     has arrived, the slope at its end is and remains that of the interval itself.
-///   - After the newest pose, and after the last pose before a gap, the motion continues and slows
-///     down until it stops, within kMaxExtrapolationS.
-///   - If a pose arrives after its time was displayed, the difference to the displayed pose fades
-///     within kCorrectionS.
+/// The displayed motion is continuous, whenever poses arrive:
+/// - A curve through the poses is not changed after its display has begun. The slope at a pose is
+///   the secant through both neighbours. If an interval is displayed before the pose after it has
+///   arrived, the slope at its end remains that of the interval itself.
+/// - After the newest pose, and after the last pose before a gap, the motion continues and slows
+///   down until it stops, within kMaxExtrapolationS.
+/// - If a pose arrives after its time was displayed, its difference from the displayed pose fades
+///   within kCorrectionS.
 class PoseHistory {
  public:
   static constexpr double kMaxExtrapolationS = 0.25;
@@ -52,11 +52,11 @@ class PoseHistory {
   /// `capacity` (in poses) and `joint_count` must be above 0.
   PoseHistory(std::size_t capacity, std::size_t joint_count);
 
-  /// Returns the memory of a history in bytes.
+  /// Returns the memory that a history takes, in bytes.
   [[nodiscard]] static std::size_t Bytes(std::size_t capacity, std::size_t joint_count);
 
-  /// Adds a pose. Returns false and does nothing unless tick and time exceed those of the newest
-  /// pose.
+  /// Adds a pose. Returns false and does nothing unless its tick and its time exceed those of the
+  /// newest pose.
   bool Push(const PoseStamp& stamp, const Vec3& root_position_m, std::span<const Quat> rotations);
 
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -70,8 +70,8 @@ class PoseHistory {
   /// Returns the index of the oldest pose with a tick above `tick`, if any.
   [[nodiscard]] std::optional<std::size_t> FirstAfterTick(std::uint64_t tick) const;
 
-  /// Returns true if the next pose cannot continue what is displayed: if the display has stopped
-  /// after the newest pose, or if the displayed poses are no longer stored.
+  /// Returns true if the next pose cannot continue the displayed motion, because the display has
+  /// stopped after the newest pose, or because the displayed poses are no longer stored.
   [[nodiscard]] bool IsInterrupted() const;
 
   /// Changes the segment of a stored pose.
@@ -82,19 +82,20 @@ class PoseHistory {
     std::size_t index = 0;  ///< Index of the newest pose at or before the sampled time.
     /// True if the pose was interpolated, or is exactly the received pose `index`.
     bool interpolated = false;
-    /// True if the pose continues the motion after the newest pose. If both are false, the pose is
-    /// held: it is pose `index`, or the end of the extrapolation.
+    /// True if the pose continues the motion after the newest pose. If this and `interpolated` are
+    /// both false, the pose is held: it is pose `index`, or the end of the extrapolation.
     bool extrapolated = false;
   };
 
   /// Computes the pose at `time_s` by cubic Hermite interpolation, which is continuous in its first
   /// derivative and exact at received poses. Rotations are interpolated in one hemisphere and
-  /// normalized. Before a discontinuity, the last pose is returned unchanged. Returns an empty
-  /// optional before the oldest pose.
+  /// normalized. Before a discontinuity, returns the last pose unchanged. Returns nullopt for times
+  /// before the oldest pose.
   [[nodiscard]] std::optional<Sampled> Sample(double time_s, Vec3& root_position_m,
                                               std::span<Quat> rotations) const;
 
-  /// Same as Sample, for a pose that is displayed: poses that arrive later continue it.
+  /// Same as Sample, for poses that are displayed. Poses that arrive later continue the displayed
+  /// motion.
   std::optional<Sampled> Display(double time_s, Vec3& root_position_m, std::span<Quat> rotations);
 
  private:
@@ -105,7 +106,7 @@ class PoseHistory {
   /// Returns the index of the oldest pose after `time_s`, or size().
   [[nodiscard]] std::size_t FirstAfterTime(double time_s) const;
 
-  /// Sample without the correction.
+  /// Does the same as Sample, without the correction.
   [[nodiscard]] std::optional<Sampled> SampleCurve(double time_s, Vec3& root_position_m,
                                                    std::span<Quat> rotations) const;
   /// Continues the motion after pose `j`.
@@ -115,7 +116,7 @@ class PoseHistory {
 
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
 
-  /// A displayed pose that the curve does not contain.
+  /// A displayed pose that is not on the curve.
   struct Correction {
     enum class State : std::uint8_t {
       kNone,

@@ -16,8 +16,8 @@
 
 namespace stridewire::client {
 
-/// The last seconds of a world for replay. It stores encoded batches and decodes only what is
-/// sampled.
+/// The last seconds of a world, for replay. Stores encoded batches and decodes only the sampled
+/// ticks.
 ///
 ///   stream (shard, or mode and shard of a region)
 ///     ticks:    oldest ... [info, epoch, parts] ... newest     encoded
@@ -27,17 +27,17 @@ class PoseRecording {
   /// Time after the last batch of its stream for which an avatar can be sampled, in seconds.
   static constexpr double kKeepS = 2.0;
 
-  /// A recording of `length_s` seconds. Batches and decoded ticks use at most `max_bytes`, of which
-  /// decoded ticks use at most half; a call of SampleAll may use more until it returns. Either may
-  /// be 0, which disables the recording.
+  /// Creates a recording of `length_s` seconds. Batches and decoded ticks take at most `max_bytes`,
+  /// and decoded ticks take at most half of that. A call of SampleAll may take more until it
+  /// returns. If either argument is 0, nothing is recorded.
   PoseRecording(double length_s, std::size_t max_bytes)
       : length_s_(length_s), max_bytes_(max_bytes) {}
 
   [[nodiscard]] bool enabled() const { return length_s_ > 0.0 && max_bytes_ > 0; }
 
-  /// Adds a copy of a batch. Poses of different epochs are not interpolated. `codecs` decodes its
-  /// poses if they are compact. If a tick of a shard arrives in two modes, only the first is
-  /// stored. Batches of a region are an exception: those of different modes contain different
+  /// Adds a copy of a batch. `codecs` decodes its poses if they are compact. Poses of different
+  /// epochs are not interpolated. If a tick of a shard arrives in two modes, only the first one is
+  /// stored. Regions are an exception, because their batches in different modes contain different
   /// avatars.
   void Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
            const std::shared_ptr<const protocol::CompactCodecs>& codecs);
@@ -72,7 +72,7 @@ class PoseRecording {
   };
   /// Decoded poses of a tick. The buffers are reused for other ticks.
   struct Decoded {
-    const Tick* source = nullptr;  ///< Null: the buffers contain nothing.
+    const Tick* source = nullptr;  ///< Null: the buffers contain no poses.
     std::uint64_t last_use = 0;
     CrowdPose poses;  ///< Poses in ascending order of avatar ids.
     [[nodiscard]] bool Find(protocol::AvatarId avatar, std::size_t& index) const;
@@ -83,10 +83,10 @@ class PoseRecording {
     std::vector<std::unique_ptr<Decoded>> decoded;
   };
   /// The ticks of a stream before and after a time, between which poses are interpolated. A pointer
-  /// is null if there is no such tick, or if a discontinuity lies between it and the time.
+  /// is null if there is no such tick, or if there is a discontinuity between it and the time.
   struct Neighbours {
     const Decoded* start = nullptr;
-    bool exact = false;  ///< True if `start` is exactly at the time; the others are then null.
+    bool exact = false;  ///< True if `start` is exactly at the time. The others are then null.
     const Decoded* end = nullptr;
     const Decoded* before = nullptr;
     const Decoded* beyond = nullptr;

@@ -114,8 +114,8 @@ void Session::AdvanceTime(double now_s) {
       if (limits_.idle_timeout_s > 0.0 && now_s - heard_s_ > limits_.idle_timeout_s) {
         LoseConnection(STRIDEWIRE_TIMEOUT, "the server sent nothing for too long", now_s);
       } else if (now_s >= next_ping_s_) {
-        // If the output buffer is full, its contents show the server that the client is alive, so
-        // no ping is necessary.
+        // If the output buffer is full, its contents prove to the server that the client is alive,
+        // so no ping is necessary.
         if (output_.size() < kMaxOutputBytes) {
           SendPing(now_s);
         } else {
@@ -203,14 +203,14 @@ void Session::LoseConnection(stridewire_status status, std::string_view text, do
 void Session::ScheduleAttempt(bool was_ready, bool server_leaves, double now_s) {
   const std::size_t count = std::max<std::size_t>(addresses_.size(), 1);
   if (was_ready && !(server_leaves && count > 1)) {
-    // The client tries the same address again, because only this server can resume the session.
+    // The client tries the same address again, because only that server can resume the session.
     failed_attempts_ = 0;
     next_attempt_s_ = now_s + backoff_.Next();
     return;
   }
   address_ = (address_ + 1) % count;
   failed_attempts_ = was_ready ? 0 : failed_attempts_ + 1;
-  // After a shutdown, the delay spreads the clients that move to the next server.
+  // After a shutdown, the delay distributes the clients that move to the next server over time.
   const bool waits = was_ready || failed_attempts_ >= count;
   next_attempt_s_ = waits ? now_s + backoff_.Next() : now_s;
   if (waits) failed_attempts_ = 0;

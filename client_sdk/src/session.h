@@ -18,7 +18,7 @@ namespace stridewire::client {
 ///                                                                   kIdle <--- kClosing
 class Session : public SessionCommands {
  public:
-  /// Longest time to send Goodbye, in seconds.
+  /// Maximum time for sending Goodbye, in seconds.
   static constexpr double kGoodbyeS = 1.0;
   /// If a connection was ready for this time, the back-off starts again with its shortest delay.
   static constexpr double kStableS = 2.0;
@@ -45,8 +45,8 @@ class Session : public SessionCommands {
   /// Same as OnBytes for transports that keep frames apart, such as WebSocket. `frame` must be one
   /// complete frame and begin on a multiple of 8 bytes.
   void OnFrame(std::span<const std::byte> frame, double now_s);
-  /// Returns the command of the application that the frame of the last OnFrame has answered; 0 if
-  /// it was no Reply, or a Reply to a command of the session itself.
+  /// Returns the command of the application that the frame of the last OnFrame answered. Returns 0
+  /// if the frame was no Reply, or a Reply to a command of the session itself.
   [[nodiscard]] std::uint64_t answered_command() const { return answered_command_; }
   /// Must be called when the attempt to connect has failed or the connection was lost.
   void OnLost(stridewire_status status, std::string_view text, double now_s);
@@ -94,13 +94,14 @@ class Session : public SessionCommands {
   void OnRemoveReply(World& world, const protocol::Remove& remove, const protocol::Reply& reply);
   void OnObserveReply(World& world, const protocol::Observe& observe, const protocol::Reply& reply);
   void FollowSpawned(World& world, const protocol::Event& event);
-  /// A new session has begun. Queues the commands that restore worlds and subscriptions.
+  /// Called when a new session has begun. Queues the commands that restore worlds and
+  /// subscriptions.
   void RestoreSession();
   void Reset();
   void LoseConnection(stridewire_status status, std::string_view text, double now_s);
   /// Chooses the address and the time of the next attempt to connect.
   void ScheduleAttempt(bool was_ready, bool server_leaves, double now_s);
-  /// Returns the text of the current address; empty if there is none.
+  /// Returns the text of the current address. Returns an empty string if there is no address.
   [[nodiscard]] std::string_view AddressText() const;
   void CloseWithError(stridewire_status status, std::string_view text);
   void SendPing(double now_s);

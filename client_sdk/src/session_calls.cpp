@@ -25,8 +25,8 @@ stridewire_status ToStatus(ErrorCode code) {
 template <typename Message>
 stridewire_status SessionCommands::Enqueue(stridewire_world world, Message message,
                                            std::size_t bytes, std::uint64_t& command) {
-  // Seq and world are set when the command is sent. All other fields are checked now, so that the
-  // call can report errors.
+  // `seq` and `world` are set when the command is sent. All other fields are checked now, so that
+  // the call can report errors.
   message.seq = 1;
   if constexpr (requires { message.world; }) message.world = 1;
   if (Status status = protocol::Check(message); !status) {

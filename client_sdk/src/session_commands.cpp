@@ -11,8 +11,8 @@ namespace stridewire::client {
 
 namespace {
 
-// Estimated memory of an avatar that the client evaluates, besides its pose history. It limits the
-// number of such avatars.
+// Estimated memory of an evaluated avatar, in addition to its pose history. It limits the number of
+// such avatars.
 constexpr std::size_t kReplicaBytes = std::size_t{16} << 10;
 
 }  // namespace
@@ -124,7 +124,7 @@ void SessionCommands::Send(Command command) {
       },
       command.message);
   if (!status) {
-    // The command exceeds the limits of the server. Its seq is not used.
+    // The command exceeds the limits of the server. Its sequence number is not used.
     Answer(command, STRIDEWIRE_LIMIT_REACHED, Describe(status.error()));
     return;
   }

@@ -4,12 +4,12 @@
 
 namespace stridewire::client {
 
-/// The commands of a session: it checks, queues, sends and ends them.
+/// The commands of a session. Checks, queues, sends and ends them.
 ///
 /// A command is first in `unsent` of its world, until the world has a server id and the output
-/// buffer has room. Then it is in `unanswered_`, in order of seq, and finally it becomes a REPLY
-/// event. After a lost session, the session joins its worlds and subscribes again before it sends
-/// unsent commands.
+/// buffer has room. It then moves to `unanswered_`, which is in order of sequence numbers, and
+/// finally becomes a REPLY event. After a lost session, the session first joins its worlds and
+/// subscribes again, and then sends unsent commands.
 class SessionCommands : public SessionState {
  public:
   using SessionState::SessionState;
@@ -36,9 +36,10 @@ class SessionCommands : public SessionState {
                                std::uint64_t& command);
   stridewire_status StopObserving(std::uint32_t subscription, std::uint64_t& command);
 
-  /// Queries what an avatar is doing. The answer is an AvatarState message with `nonce`; there is
-  /// none if the connection is lost or kInspectTimeoutS passes. Fails with NOT_READY if the world
-  /// is not joined now, and with COMMANDS_FULL beyond kMaxInspections unanswered queries.
+  /// Queries the state of an avatar. The answer is an AvatarState message with `nonce`. There is no
+  /// answer if the connection is lost or kInspectTimeoutS passes. Fails with NOT_READY if the world
+  /// is not joined, and with COMMANDS_FULL if there are more than kMaxInspections unanswered
+  /// queries.
   stridewire_status Inspect(stridewire_world world, protocol::AvatarId avatar,
                             std::uint64_t& nonce);
   static constexpr double kInspectTimeoutS = 10.0;
@@ -50,7 +51,7 @@ class SessionCommands : public SessionState {
                      Expected<std::shared_ptr<const MotionLibrary>> result);
 
  protected:
-  /// Calls Enqueue and then sends what can be sent.
+  /// Calls Enqueue and then sends everything that may be sent.
   template <typename Message>
   stridewire_status SendCommand(stridewire_world world, Message message, std::size_t bytes,
                                 std::uint64_t& command);
@@ -62,8 +63,8 @@ class SessionCommands : public SessionState {
   void Pump();
   [[nodiscard]] bool MaySend() const;
   void Send(Command command);
-  /// Returns whether a command may be sent. An Observe of movements waits for its library, or is
-  /// answered here if the library is not available.
+  /// Determines whether a command may be sent. An Observe of movements waits for its library. If
+  /// the library is not available, this function answers the command.
   enum class Readiness : std::uint8_t { kReady, kWaits, kAnswered };
   Readiness PrepareMovements(World& world, const Command& command);
   void RequestLibraries();

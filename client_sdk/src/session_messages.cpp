@@ -85,7 +85,8 @@ void Session::RestoreSession() {
   clock_.Reset();
   playout_.Reset();
 
-  // An unanswered Observe is sent again under its command number, because its REPLY is still due.
+  // An unanswered Observe is sent again under its command number, because its REPLY is still
+  // pending.
   std::map<protocol::SubscriptionId, Command> unanswered_observes;
   for (auto& [seq, command] : std::exchange(unanswered_, {})) {
     const auto world = worlds_.find(command.world);
@@ -93,7 +94,7 @@ void Session::RestoreSession() {
     if (is_known && std::holds_alternative<protocol::JoinWorld>(command.message)) continue;
     if (std::holds_alternative<protocol::LeaveWorld>(command.message) ||
         std::holds_alternative<protocol::StopObserving>(command.message)) {
-      Answer(command, STRIDEWIRE_OK);  // In a new session there is nothing to leave or stop.
+      Answer(command, STRIDEWIRE_OK);  // In a new session there is nothing to leave or to stop.
       continue;
     }
     if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
@@ -139,14 +140,14 @@ void Session::RestoreSession() {
       if (subscription.unsent) continue;  // The subscription's Observe is still in `unsent`.
       subscription.unsent = true;
       if (const auto found = unanswered_observes.find(id); found != unanswered_observes.end()) {
-        // Use the latest message, because the region may have moved.
+        // The latest message is used, because the region may have moved.
         found->second.message = subscription.message;
         first.push_back(std::move(found->second));
       } else {
         first.push_back(Command{0, handle, true, 0, subscription.message});
       }
     }
-    // Drop the spawns of an earlier lost session; they are created again below.
+    // Removes the spawns of an earlier lost session. They are created again below.
     std::erase_if(world.unsent, [](const Command& command) {
       return command.own && std::holds_alternative<protocol::Spawn>(command.message);
     });
@@ -203,12 +204,12 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
                           now_s);
   }
   const auto found = unanswered_.find(message.seq);
-  // Ignore a second Reply, which may arrive after a resume.
+  // A second Reply may arrive after a resume. It is ignored.
   if (found == unanswered_.end()) return;
   const Command command = std::move(found->second);
   unanswered_.erase(found);
   answered_command_ = command.own ? 0 : command.id;
-  // Replies may arrive in any order: the world is unknown if a later LeaveWorld was answered first.
+  // Replies may arrive in any order. The world is unknown if a later LeaveWorld was answered first.
   const auto entry = worlds_.find(command.world);
   World* world = entry == worlds_.end() ? nullptr : &entry->second;
 
@@ -242,7 +243,8 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
              world != nullptr && observe != nullptr) {
     OnObserveReply(*world, *observe, message);
   }
-  // If only some items failed, the reply as a whole is OK. Report the first failed item instead.
+  // If only some items failed, the reply as a whole is OK. The first failed item is reported
+  // instead.
   std::string text = message.text;
   for (const protocol::ReplyItem& item : message.items) {
     if (status != STRIDEWIRE_OK) break;
@@ -254,7 +256,8 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
   if (std::holds_alternative<protocol::LeaveWorld>(command.message)) worlds_.erase(command.world);
 }
 
-// An avatar that the session spawns again may still exist, because the world outlives the session.
+// Returns true if a failed item is expected. An avatar that the session spawns again may still
+// exist, because the world outlives the session.
 bool Session::IsExpected(const Command& command, const protocol::ReplyItem& item) {
   return command.own && item.code == protocol::StatusCode::kAvatarExists;
 }
@@ -418,7 +421,7 @@ void Session::Handle(const protocol::Events& message, double now_s) {
                           now_s);
   }
   if (message.number != 0) {
-    // Ignore a message that was received before the resume.
+    // Ignores a message that was received before the resume.
     if (message.number <= last_events_number_) return;
     last_events_number_ = message.number;
   }

@@ -113,7 +113,8 @@ std::uint64_t SessionState::EveryNTicks(const World& world, protocol::PoseMode m
 }
 
 double SessionState::PoseIntervalS() const {
-  // Avatars whose poses are further apart are extrapolated, instead of delaying all others.
+  // If the poses of an avatar are further apart than this, the avatar is extrapolated instead of
+  // delaying all others.
   constexpr double kMaxIntervalS = 0.25;
   std::uint64_t every = 1;
   for (const auto& [handle, world] : worlds_) {

@@ -35,13 +35,14 @@ struct SessionOptions {
   std::size_t pose_history = 32;
   std::size_t max_pose_bytes = std::size_t{256} << 20;
   double recording_s = 0.0;  ///< Length of the recording of each world. 0: none.
-  std::size_t max_recording_bytes = std::size_t{192} << 20;  ///< Memory of one world's recording.
+  /// Maximum memory of one world's recording.
+  std::size_t max_recording_bytes = std::size_t{192} << 20;
   double connect_timeout_s = 5.0;
   double ping_interval_s = 1.0;
   double render_delay_s = -1.0;  ///< Negative: the delay adapts to the link.
   bool respawn = false;
   /// True: items of replies and events of avatars become events. False: the application reads them
-  /// from the messages themselves.
+  /// from the messages.
   bool detailed_events = true;
   std::string library_folder;  ///< Folder that caches libraries. Empty: no cache.
   std::uint64_t seed = 1;
@@ -50,8 +51,8 @@ struct SessionOptions {
 /// Returns the memory of a terrain in bytes.
 [[nodiscard]] std::size_t TerrainBytes(const std::optional<protocol::TerrainInfo>& terrain);
 
-/// The data of a session and what the application reads of it. SessionCommands and Session build on
-/// it.
+/// The data of a session, and the functions with which the application reads it. SessionCommands
+/// and Session build on it.
 class SessionState {
  public:
   enum class State : std::uint8_t {
@@ -81,9 +82,9 @@ class SessionState {
   [[nodiscard]] const WorldView* FindWorld(stridewire_world world) const;
   [[nodiscard]] WorldView* FindWorld(stridewire_world world);
   [[nodiscard]] std::optional<WorldState> FindWorldState(stridewire_world world) const;
-  /// Returns the world with a number of the server, or 0.
+  /// Returns the world to which the server has assigned the id `id`, or 0.
   [[nodiscard]] stridewire_world FindHandle(protocol::WorldId id) const;
-  /// Returns the terrain of an existing world, as last received.
+  /// Returns the last received terrain of an existing world.
   [[nodiscard]] const std::optional<protocol::TerrainInfo>& TerrainOf(
       stridewire_world world) const {
     return worlds_.at(world).terrain;
@@ -142,9 +143,10 @@ class SessionState {
   /// Returns whether the session is connected or tries to connect.
   [[nodiscard]] bool IsOpen() const;
   World* FindByServerId(protocol::WorldId id, stridewire_world& handle);
-  /// Lets the view of a world store only poses of avatars that a subscription covers.
+  /// Restricts the view of a world to poses of avatars that a subscription covers.
   void UpdateFilter(World& world);
-  /// Returns the shortest interval of the subscriptions that receive poses of a mode; 0: none.
+  /// Returns the shortest interval of the subscriptions that receive poses of a mode, or 0 if there
+  /// are none.
   [[nodiscard]] static std::uint64_t EveryNTicks(const World& world, protocol::PoseMode mode);
   /// Returns the longest interval of the poses that are observed, in seconds.
   [[nodiscard]] double PoseIntervalS() const;
@@ -194,9 +196,9 @@ class SessionState {
   double heard_s_ = 0.0;
   double next_ping_s_ = 0.0;
   std::uint64_t ping_nonce_ = 0;
-  /// Pings of the application that have no Pong yet; at most 64.
+  /// Pings of the application without a Pong; at most 64.
   std::set<std::uint64_t> pending_pings_;
-  /// Unanswered inspections by nonce, with the times at which they are given up.
+  /// Unanswered inspections: nonce and time at which the inspection expires.
   std::map<std::uint64_t, double> inspections_;
   std::uint64_t inspection_nonce_ = 0;
   std::optional<protocol::FrameReader> reader_;

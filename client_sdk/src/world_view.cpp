@@ -88,7 +88,7 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
   if (shard.epoch != epoch_) {
     shard = Shard{info.tick, 0, epoch_, info.mode};
   } else if (info.tick > shard.tick) {
-    // Batches of a region have gaps at ticks at which no pose is due.
+    // Batches of a region have gaps at ticks in which no pose is due.
     if (!info.is_partial && every_n_ticks > 0 && info.tick - shard.tick > every_n_ticks) {
       counts.missing += (info.tick - shard.tick - 1) / every_n_ticks;
     }
@@ -136,7 +136,7 @@ const WorldView::Track* WorldView::FindTrack(protocol::AvatarId avatar) const {
 }
 
 WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
-  // The avatars of a message are in ascending order, with those of other shards between them.
+  // The avatars of a message are in ascending order, with those of other shards in between.
   constexpr std::size_t kMaxSteps = 8;
   std::size_t index = next_track_;
   const std::size_t end = std::min(index + kMaxSteps, tracks_.size());
@@ -167,7 +167,7 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseS
     ++counts.poses;
     track.epoch = epoch_;
     SetGone(track, false);
-    // The tick of a pose can repeat, if a second subscription contains the avatar.
+    // The tick of a pose can repeat if a second subscription contains the avatar.
   } else if (stamp.tick != track.seen_tick) {
     ++counts.refused;
   }
@@ -215,7 +215,7 @@ void WorldView::RecordEvaluated(const protocol::Movements& movements) {
   protocol::PoseMode mode = protocol::PoseMode::kCompact;
   if (fits_ && block_.size() > 0) EncodeBlock(*codecs_->Find(mode));
   if (!fits_) {
-    // A pose is outside the range of the compact codes, or there are none.
+    // A pose is outside the range of the compact codes, or there are no codes.
     mode = protocol::PoseMode::kQuantised;
     const std::size_t bytes = protocol::PoseBytes(mode, joints);
     encoded_.resize(evaluated_.size() * bytes);

@@ -25,11 +25,12 @@ struct PoseBudget {
   std::size_t used_bytes = 0;
 };
 
-/// Numbers of displayed poses.
+/// Counts of displayed poses.
 struct DisplayCounts {
   std::uint64_t poses = 0;
   std::uint64_t extrapolated = 0;
-  std::uint64_t held = 0;  ///< Poses after the newest pose of their avatar, when it had stopped.
+  /// Poses after the newest pose of their avatar whose motion had stopped.
+  std::uint64_t held = 0;
 
   void Add(const PoseHistory::Sampled& sampled, bool is_after_newest) {
     ++poses;
@@ -43,17 +44,18 @@ class WorldView : public PoseSink {
  public:
   /// Poses of an avatar that is gone can be sampled for this time, in seconds of server time.
   static constexpr double kKeepGoneS = 2.0;
-  /// After an avatar has left the region, the view ignores its older poses for this many ticks.
+  /// If an avatar has left the region, the view ignores its older poses for this many ticks.
   static constexpr std::uint64_t kKeepLeftTicks = 600;
-  /// Largest number of shards, counted once per mode. A batch of any further shard is an error.
+  /// Maximum number of shards, counted separately for each mode. A batch of any further shard is an
+  /// error.
   static constexpr std::size_t kMaxShards = 1024;
 
   struct Counts {
     std::uint64_t batches = 0;
     std::uint64_t poses = 0;
-    /// Poses that were refused for lack of memory or because they were not newer than the last one.
+    /// Poses that were dropped for lack of memory or because they were not newer than the last one.
     std::uint64_t refused = 0;
-    std::uint64_t missing = 0;  ///< Missing batches, estimated from gaps in the ticks.
+    std::uint64_t missing = 0;  ///< Estimated number of missing batches, from gaps in the ticks.
   };
 
   /// `recording` defines the limits of the view's recording. By default nothing is recorded.
@@ -80,20 +82,21 @@ class WorldView : public PoseSink {
   void ClearPoses();
 
   /// Marks the next pose of every avatar as a discontinuity. Call it after a resume and after a new
-  /// subscription, because the server cannot flag those in batches that clients share.
+  /// subscription. The server cannot flag these discontinuities, because clients share batches.
   void Break() { ++epoch_; }
 
-  /// Stores only poses of these avatars; std::nullopt: of all avatars.
+  /// Stores only poses of these avatars. nullopt: of all avatars.
   void SetFilter(std::optional<std::set<protocol::AvatarId>> filter);
 
-  /// Stores the poses of a batch. `every_n_ticks` is the requested interval, which is needed to
-  /// count missing batches; 0: unknown. On error the poses before the invalid one are stored. Fails
+  /// Stores the poses of a batch. `every_n_ticks` is the requested interval, from which missing
+  /// batches are counted; 0: unknown. On error, the poses before the invalid one are stored. Fails
   /// with the errors of PoseBatchReader::Decode, with kShapeMismatch for another number of joints,
   /// with kLimitExceeded for too many shards, and with kMalformed if the ticks of a shard decrease.
   Status Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
 
-  /// Evaluates movement records with `replicas`, and stores and records the poses of ticks that
-  /// `every_n_ticks` divides. Fails with the errors of ReplicaSet::Apply, and with kShapeMismatch.
+  /// Evaluates movement records with `replicas`. Stores and records the poses of ticks that are
+  /// multiples of `every_n_ticks`. Fails with the errors of ReplicaSet::Apply, and with
+  /// kShapeMismatch.
   Status Apply(const protocol::Movements& movements, ReplicaSet& replicas,
                std::uint64_t every_n_ticks, Counts& counts);
 
@@ -103,7 +106,7 @@ class WorldView : public PoseSink {
   /// ticks that arrive later are ignored.
   void Leave(protocol::AvatarId avatar, std::uint64_t tick);
 
-  /// Gives all stored poses new segments. Call it after the displayed time has jumped.
+  /// Assigns new segments to all stored poses. Call it after the displayed time has jumped.
   void RenumberSegments();
 
   /// Returns the poses of an avatar, or null if it is unknown.
@@ -116,8 +119,8 @@ class WorldView : public PoseSink {
   /// Changes whenever the result of Avatars changes.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
 
-  /// Calls `call(avatar, history, is_gone)` for every avatar with poses, in ascending order. Gone
-  /// avatars are included until their poses are erased.
+  /// Calls `call(avatar, history, is_gone)` for every avatar with poses, in ascending order.
+  /// Avatars that are gone are included until their poses are erased.
   template <typename Call>
   void ForEach(const Call& call) const {
     for (const Track& track : tracks_) {
@@ -125,14 +128,14 @@ class WorldView : public PoseSink {
     }
   }
 
-  /// The poses of the last seconds: the received batches, and evaluated poses in compact form.
+  /// The poses of the last seconds, as received batches, or in compact form if they were evaluated.
   /// Clear also clears them.
   [[nodiscard]] PoseRecording& recording() { return recording_; }
 
   /// Samples all avatars at a server time, for display, and counts the poses.
   void SampleAll(double time_s, CrowdPose& out, DisplayCounts& displayed);
 
-  /// Returns whether the filter admits an avatar.
+  /// Returns true if the filter admits an avatar.
   [[nodiscard]] bool Admits(protocol::AvatarId avatar) const {
     return !filter_ || filter_->contains(avatar);
   }
@@ -167,7 +170,7 @@ class WorldView : public PoseSink {
   [[nodiscard]] std::vector<Track>::iterator LowerBound(protocol::AvatarId avatar);
   [[nodiscard]] const Track* FindTrack(protocol::AvatarId avatar) const;
   /// Finds or creates the track of an avatar. Returns null if there is no memory for it. Fast if
-  /// the avatar follows that of the last call closely.
+  /// the avatar is one of the next after that of the last call.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
 
@@ -175,8 +178,8 @@ class WorldView : public PoseSink {
   void RecordEvaluated(const protocol::Movements& movements);
   void EncodeBlock(const protocol::CompactCodec& codec);
 
-  /// Must be called after the last part of a batch. Marks avatars of its shard and mode that were
-  /// not in it as gone.
+  /// Must be called after the last part of a batch. Marks the avatars of its shard and mode that it
+  /// did not contain as gone.
   void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
   /// Erases avatars that have been gone for longer than kKeepGoneS.
   void EraseGone(double time_s);
@@ -193,8 +196,9 @@ class WorldView : public PoseSink {
   std::vector<std::string> layers_;
   std::shared_ptr<const protocol::CompactCodecs> codecs_;  ///< Codecs of compact poses, or null.
   std::optional<std::set<protocol::AvatarId>> filter_;
-  std::vector<Track> tracks_;   // In ascending order of the avatars.
-  std::size_t next_track_ = 0;  // Index after the track that was found last.
+  std::vector<Track> tracks_;  // In ascending order of the avatars.
+  // Index after the last track that was found, where the next search starts.
+  std::size_t next_track_ = 0;
   std::size_t gone_count_ = 0;  // Number of tracks that are gone.
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
@@ -208,8 +212,8 @@ class WorldView : public PoseSink {
   // Interval of poses in ticks, as requested. Set while Apply(Movements) runs.
   std::uint64_t replica_every_n_ticks_ = 1;
   Counts* replica_counts_ = nullptr;  // Counters to update. Set while Apply(Movements) runs.
-  // The poses of one message for the recording, in the order of evaluation, and their encoding.
-  // The last poses are in `block_` and not encoded yet.
+  // Poses of one message for the recording, in the order of evaluation, and their encoding. The
+  // last poses are still in `block_` and not encoded yet.
   std::vector<protocol::AvatarId> evaluated_;
   std::vector<std::uint8_t> evaluated_flags_;
   std::vector<std::byte> encoded_;

@@ -17,7 +17,7 @@ ReplicaSet::ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick
   STRIDEWIRE_CHECK(tick_s > 0.0);
 }
 
-// Forgets the shard's avatars if `message` does not follow the last message that was applied.
+// Discards the shard's avatars if `message` does not follow the last message that was applied.
 void ReplicaSet::Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink) {
   const std::uint64_t previous_step = message.states ? message.step : message.step - 1;
   const std::uint16_t part = message.states ? 0 : message.part;

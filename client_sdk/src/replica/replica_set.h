@@ -21,8 +21,8 @@ class PoseSink {
   virtual void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                       ConstPoseSpan pose) = 0;
 
-  /// Called when an avatar was removed, left the subscription, or lost its state with a missing
-  /// message.
+  /// Called when an avatar was removed, left the subscription, or lost its state because a message
+  /// is missing.
   virtual void OnGone(protocol::AvatarId avatar) = 0;
 
   /// The set evaluates only avatars for which this function returns true. If the result changes to
@@ -31,24 +31,26 @@ class PoseSink {
 };
 
 /// Evaluates the avatars of one world from movement records (protocol/STANDARD.md, "Movement
-/// records"). The poses equal the server's poses of the same ticks, bit for bit.
+/// records"). The poses are bit-identical to the server's poses of the same ticks.
 ///
-///   message in order         apply its records; advance all avatars of the shard by one tick
-///   message missing          forget all avatars of the shard until the server sends their states
+/// - If a message follows the previous one, the set applies its records and advances all avatars of
+///   the shard by one tick.
+/// - If a message is missing, the set discards all avatars of the shard until the server sends
+///   their states.
 ///
 /// Used by the client library and by stridewire-load. Not thread-safe.
 class ReplicaSet {
  public:
-  /// Largest number of shards. A message of any further shard is an error.
+  /// Maximum number of shards. A message of any further shard is an error.
   static constexpr std::size_t kMaxShards = 1024;
 
   /// Evaluates at most `max_avatars` avatars and ignores further ones. Each takes about 13 KB.
   ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s, std::size_t max_avatars);
 
-  /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded for
-  /// too many shards, and with the error of AvatarReplica::Apply for an invalid record or a record
-  /// made with another library. After an error the shard's avatars stay unknown until their next
-  /// states.
+  /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded if
+  /// there are too many shards. Fails with the error of AvatarReplica::Apply if a record is invalid
+  /// or was made with another library. After an error, the shard's avatars are unknown until the
+  /// server sends their next states.
   [[nodiscard]] Status Apply(const protocol::Movements& message, PoseSink& sink);
 
   [[nodiscard]] const MotionLibrary& library() const { return *library_; }
@@ -79,7 +81,7 @@ class ReplicaSet {
   std::size_t max_avatars_;
   std::size_t avatar_count_ = 0;  // Number of avatars of all shards.
   std::map<std::uint16_t, Shard> shards_;
-  std::vector<AvatarReplica*> replicas_;  // Scratch memory: their replicas.
+  std::vector<AvatarReplica*> replicas_;  // Scratch memory: replicas of the avatars in `due_`.
   std::vector<Avatar*> due_;              // Scratch memory: the avatars that advance.
   ReplicaEvaluator evaluator_;
   FootPlanScratch plan_scratch_;

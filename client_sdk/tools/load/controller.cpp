@@ -294,7 +294,7 @@ void Controller::OnRequestReply(const protocol::Reply& reply, const Pending& pen
     if (item.code == protocol::StatusCode::kOk) continue;
     ++counts_.requests_rejected;
     ++counts_.rejected_by_code[item.code];
-    // The library has no jumps, so do not request further ones.
+    // The library has no jumps, so the controller stops requesting them.
     if (item.code == protocol::StatusCode::kNoMovement ||
         item.code == protocol::StatusCode::kUnsupported) {
       can_jump_ = false;
@@ -320,7 +320,7 @@ void Controller::OnEvent(const protocol::Event& event) {
     case protocol::EventType::kRejected:
       if (event.request_id == 0) return;
       if (event.code == protocol::StatusCode::kDropped) {
-        // This program has dropped the request itself, for example with its avatar.
+        // This program has dropped the request itself, for example by removing its avatar.
         if (probes_ != nullptr) probes_->Rejected(event.avatar - 1, event.request_id);
         return;
       }

@@ -23,7 +23,8 @@ struct ControllerCounts {
   /// Number of requests that were rejected, in the Reply or later by an event.
   std::uint64_t requests_rejected = 0;
   std::map<protocol::StatusCode, std::uint64_t> rejected_by_code;
-  LatencyHistogram send_late;  ///< Delay between the planned and the actual sending of a request.
+  /// Delay of the actual behind the planned time of sending a request.
+  LatencyHistogram send_late;
 };
 
 /// A simulated game server. It spawns the avatars of one world, requests movements according to a
@@ -61,7 +62,7 @@ class Controller final : public Session {
   struct Walker {
     Wanderer wanderer;
     std::size_t next = 0;  ///< Choreography: index of the avatar's next movement.
-    /// Choreography: number of movements that were requested but have not started.
+    /// Choreography: number of requested movements that have not started.
     std::size_t waiting = 0;
   };
   struct Due {

@@ -8,7 +8,7 @@
 
 namespace stridewire::load {
 
-/// Collects error texts: the first kMaxKept, and the number of further ones. Thread-safe.
+/// Collects error texts: the first kMaxKept of them, and the number of further ones. Thread-safe.
 class ErrorLog {
  public:
   static constexpr std::size_t kMaxKept = 50;

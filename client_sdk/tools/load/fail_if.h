@@ -14,11 +14,11 @@ namespace stridewire::load {
 ///   NAME OPERATOR NUMBER      OPERATOR: > >= < <= == !=
 class FailIf {
  public:
-  /// Fails with kMalformed; `where` is "--fail-if 'TEXT'".
+  /// Fails with kMalformed. Error::where is then "--fail-if 'TEXT'".
   [[nodiscard]] static Expected<FailIf> Parse(std::string_view text);
 
-  /// Returns whether the condition is true. A number that could not be measured makes it true as
-  /// well, so that a missing measurement does not pass as a success.
+  /// Returns true if the condition is true, or if its number could not be measured, so that a
+  /// missing measurement does not count as a success.
   [[nodiscard]] bool Fails(const LoadReport& report) const;
 
   /// Describes the failure, for example "ticks_missed>0: it is 3".

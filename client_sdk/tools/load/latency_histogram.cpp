@@ -7,11 +7,11 @@
 namespace stridewire::load {
 namespace {
 
-constexpr int kExactBits = 8;  // Values below 2^kExactBits have bins of their own.
+constexpr int kExactBits = 8;  // Values below 2^kExactBits have separate bins.
 constexpr int kBinsPerOctave = 1 << (kExactBits - 1);
 constexpr std::size_t kExactBins = std::size_t{1} << kExactBits;
 
-/// Returns by how many bits to shift a value right so that kExactBits bits remain.
+/// Returns the number of bits by which to shift a value right so that kExactBits bits remain.
 int Shift(std::int64_t us) {
   return std::max(0, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(us))) - kExactBits);
 }

@@ -20,8 +20,8 @@ class LatencyProbes {
  public:
   explicit LatencyProbes(std::size_t avatar_count) : probes_(avatar_count) {}
 
-  /// Starts a probe. If the avatar has an open probe, closes it and records the time until `now_ns`
-  /// as its latency, so that a server that drops steps does not appear faster.
+  /// Starts a probe. If the avatar already has an open probe, closes it and records the time until
+  /// `now_ns` as its latency, so that a server that drops steps does not appear faster.
   void Schedule(std::size_t avatar, std::uint64_t request, std::int64_t scheduled_ns,
                 std::int64_t now_ns);
 
@@ -32,8 +32,8 @@ class LatencyProbes {
   /// Must be called when the server has rejected a request. Closes its probe without a measurement.
   void Rejected(std::size_t avatar, std::uint64_t request);
 
-  /// Must be called when a pose has arrived. `changed` states whether it differs from the previous
-  /// one.
+  /// Must be called when a pose has arrived. `changed` is true if it differs from the previous
+  /// pose.
   void Pose(std::size_t avatar, std::uint64_t tick, std::int64_t arrived_ns, bool changed);
 
   /// Closes the probe of an avatar without a measurement, because its observer was dropped
@@ -43,8 +43,8 @@ class LatencyProbes {
   /// Discards all measurements. Open probes stay open.
   void StartCounting() { times_ = LatencyHistogram(); }
 
-  /// Closes all open probes and records the time until `now_ns` as their latency. Returns how many
-  /// probes were open.
+  /// Closes all open probes and records the time until `now_ns` as their latency. Returns the
+  /// number of these probes.
   std::size_t Finish(std::int64_t now_ns);
 
   [[nodiscard]] std::size_t open_count() const { return open_count_; }

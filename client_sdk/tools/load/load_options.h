@@ -37,14 +37,14 @@ struct LoadOptions {
   int worlds = 1;
   int avatars = 0;
   int observers = 0;
-  int partial_observers = 0;  ///< Observers that subscribe to some avatars only.
+  int partial_observers = 0;  ///< Observers that subscribe only to some avatars.
   int partial_avatars = 100;  ///< Avatars per partial observer.
   double seconds = 10.0;
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
   protocol::PoseDetail detail = protocol::PoseDetail::kAll;
   std::string library = "builtin";  ///< Library of the server's worlds, for mode movement.
   std::string choreography;         ///< File of the choreography. Empty: the avatars wander.
-  /// True if each observer watches all worlds, false if it watches one world.
+  /// True if each observer observes all worlds, false if it observes one world.
   bool observe_all = true;
   double churn_per_s = 0.0;
   int threads = 1;

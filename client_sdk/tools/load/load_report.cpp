@@ -119,7 +119,7 @@ std::string Line(const char* name, const std::optional<Quantiles>& quantiles,
 }  // namespace
 
 std::string ToJson(const LoadReport& report) {
-  // Errors can quote text of the server that is not valid UTF-8.
+  // Errors may contain text of the server that is not valid UTF-8.
   return ToDocument(report).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 

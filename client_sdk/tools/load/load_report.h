@@ -33,8 +33,9 @@ struct LoadReport {
   std::uint64_t poses_invalid = 0;     ///< Received poses that failed a check.
   std::uint64_t bytes_received = 0;    ///< Bytes of the frames of measured batches, with headers.
   std::uint64_t batches_dropped = 0;   ///< Batches that the server dropped for slow observers.
-  std::optional<double> moving_share;  ///< Share of received poses that were not standing.
-  std::optional<Quantiles> tick_ms;    ///< Durations from the server's metrics; empty without them.
+  std::optional<double> moving_share;  ///< Fraction of the received poses that were not standing.
+  /// Durations of ticks from the server's metrics; empty without metrics.
+  std::optional<Quantiles> tick_ms;
   std::optional<std::uint64_t> ticks_missed;
   std::optional<Quantiles> step_latency_ms;  ///< Latency of steps; empty if no step was measured.
   std::uint64_t steps_measured = 0;
@@ -57,7 +58,8 @@ struct LoadReport {
 [[nodiscard]] std::string ToText(const LoadReport& report);
 
 /// Returns a number of the report by its JSON path, for example "tick_ms.p99". `errors` is the
-/// number of errors. Empty if it was not measured. `name` must be one of ReportNumberNames.
+/// number of errors. Returns nullopt if the number was not measured. `name` must be one of
+/// ReportNumberNames.
 [[nodiscard]] std::optional<double> ReportNumber(const LoadReport& report, std::string_view name);
 /// Returns the names of all numbers.
 [[nodiscard]] std::vector<std::string> ReportNumberNames();

@@ -33,8 +33,7 @@ constexpr double kWindowLeadS = 0.1;
 constexpr std::size_t kMaxOpening = 64;
 /// Delay before a dropped observer (--churn) reconnects.
 constexpr double kChurnPauseS = 0.2;
-/// If this program's own delays exceed this, they affect the results, and the report contains a
-/// warning.
+/// Longer delays of this program itself affect the results, so the report then contains a warning.
 constexpr double kOwnLateP99Ms = 5.0;
 
 /// A thread that polls its sessions and measures its own delays.
@@ -48,7 +47,7 @@ class Worker {
 
   ThreadContext& context() { return context_; }
 
-  /// Call it before Start, or on the thread.
+  /// Call it before Start, or on the worker's thread.
   void Add(Session& session) { sessions_.push_back(&session); }
 
   void Start() {
@@ -123,7 +122,7 @@ double OwnCpuS() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Raises the soft limit on open files if necessary. Returns whether `count` files can be opened.
+/// Raises the soft limit on open files if necessary. Returns true if `count` files can be opened.
 bool AllowOpenFiles(std::size_t count) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return true;
@@ -172,7 +171,7 @@ class LoadRun {
   const std::function<void(const std::string&)>& progress_;
   tcp::endpoint server_;
   std::optional<LatencyProbes> probes_;
-  // Sessions use the contexts of the workers and must be destroyed before them.
+  // Sessions use the contexts of the workers, so workers are destroyed after them.
   std::vector<std::unique_ptr<Worker>> workers_;
   std::vector<std::unique_ptr<Controller>> controllers_;
   std::vector<std::unique_ptr<Observer>> observers_;
@@ -331,7 +330,7 @@ void LoadRun::Churn(std::int64_t now_ns) {
 }
 
 void LoadRun::Measure() {
-  // Discard everything that was counted during the setup.
+  // Discards everything that was counted during the setup.
   for (const auto& worker : workers_) {
     worker->Run([&] { worker->StartCounting(); });
   }
@@ -354,7 +353,7 @@ void LoadRun::Measure() {
   for (const auto& controller : controllers_) {
     workers_[0]->Post([controller = controller.get()] { controller->StopMoving(); });
   }
-  // Wait for steps in progress and for the last poses.
+  // Waits for steps in progress and for the last poses.
   const std::int64_t grace_ns = NowNs() + static_cast<std::int64_t>(1e9 * kGraceS);
   (void)WaitUntil(grace_ns, "finishing", [&] {
     std::size_t open_probes = 0;

@@ -12,17 +12,18 @@
 
 namespace stridewire::load {
 
-// A run takes at most this much longer than its measurement.
-/// Longest time until all observers see all avatars.
+// In addition to its measurement, a run takes at most the following times.
+//
+// Maximum time until all observers receive all avatars.
 inline constexpr double kSetUpTimeoutS = 30.0;
-inline constexpr double kGraceS = 1.0;  ///< Longest time for steps in progress at the end.
-/// Longest time for each of two reads of the metrics.
+inline constexpr double kGraceS = 1.0;  ///< Maximum time for steps in progress at the end.
+/// Maximum time for each of two reads of the metrics.
 inline constexpr double kScrapeTimeoutS = 2.0;
 
-/// Loads a server and returns the measurements. Failures are in `errors` and `failed` of the
-/// report. Blocks for `seconds` plus the times above. If `choreography` is null, the avatars
-/// wander. `library` is needed in mode movement only. Setting `stop` ends the run early. `progress`
-/// receives one line of text per second.
+/// Generates load on a server and returns the measurements. Failures are in `errors` and `failed`
+/// of the report. Blocks for `seconds` plus the times above. If `choreography` is null, the avatars
+/// wander. `library` is needed only in mode movement. Setting `stop` ends the run early. `progress`
+/// is called with one line of text per second.
 [[nodiscard]] LoadReport RunLoad(const LoadOptions& options, const Choreography* choreography,
                                  std::shared_ptr<const MotionLibrary> library,
                                  const std::atomic<bool>& stop,

@@ -79,7 +79,7 @@ int Run(int argc, char** argv) {
 
   std::fputs((options.json ? ToJson(report) + "\n" : ToText(report)).c_str(), stdout);
   bool failed = report.failed;
-  // Repeat the first error on stderr, because with --json it is inside the object.
+  // Repeats the first error on stderr, because with --json it is inside the object.
   if (report.failed && !report.errors.empty()) {
     std::fprintf(stderr, "stridewire-load: %s\n", report.errors.front().c_str());
   }

@@ -349,7 +349,7 @@ void Observer::Measure(World& world, const protocol::PoseBatch& batch, std::size
     std::memcpy(last, pose.data(), pose.size());
     world.last_sizes[index] = pose.size();
   }
-  // A step that was requested while this observer was dropped cannot be measured.
+  // A step cannot be measured if it was requested while this observer was dropped.
   if (is_first && was_dropped_) probes_->Abandon(number - 1);
   if (changed && !is_first) probes_->Pose(number - 1, batch.info.tick, now_ns, true);
 }

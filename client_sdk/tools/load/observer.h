@@ -23,47 +23,47 @@ struct ObserverCounts {
   std::uint64_t poses_received = 0;
   std::uint64_t poses_moving = 0;
   std::uint64_t poses_invalid = 0;
-  /// Poses that were not expected, because the observer was dropped (--churn).
+  /// Missing poses that are not errors, because this program dropped the observer (--churn).
   std::uint64_t poses_excused = 0;
   std::uint64_t bytes_received = 0;
   std::uint64_t batches_dropped = 0;
 };
 
-/// A session that observes worlds and counts and checks the poses.
+/// A session that observes worlds, and counts and checks the poses.
 ///
 /// It checks that the world is known, that mode and number of joints are as requested, that ticks
 /// increase, that no avatar appears twice per tick, that poses can be decoded, and that no root
-/// moves faster than kMaxSpeedMPerS without the flag discontinuity.
+/// moves faster than kMaxSpeedMPerS without the flag for a discontinuity.
 class Observer final : public Session {
  public:
   static constexpr double kMaxSpeedMPerS = 15.0;
   static constexpr double kSpeedSlackM = 0.05;
-  /// Time after a reconnect in which missing poses are excused: in mode movement, the state of an
-  /// avatar arrives at least one tick after the first message.
+  /// Time after a reconnect in which missing poses are not errors. In mode movement, the state of
+  /// an avatar arrives at least one tick after the first message.
   static constexpr double kReconnectS = 1.0;
 
-  /// Observers with an `index` below LoadOptions::observers observe all avatars, the others some.
-  /// If `probes` is not null, this observer measures latency; it must run on the thread of the
-  /// probes and observe all avatars.
+  /// Observers with an `index` below LoadOptions::observers observe all avatars, the others only
+  /// some. If `probes` is not null, this observer measures latency. It must then run on the thread
+  /// of the probes and observe all avatars.
   Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server, RunState& run,
            int index, LatencyProbes* probes);
 
-  /// Returns whether the observer has received a pose of every observed avatar.
+  /// Returns true if the observer has received a pose of every observed avatar.
   [[nodiscard]] bool sees_all() const { return sees_all_.load(); }
-  /// Returns whether the observer has received the last tick of the window from every shard.
+  /// Returns true if the observer has received the last tick of the window from every shard.
   [[nodiscard]] bool saw_last_tick() const { return saw_last_tick_.load(); }
   [[nodiscard]] std::uint64_t latest_tick() const { return latest_tick_.load(); }
 
   /// Number of observed avatars.
   [[nodiscard]] std::uint64_t avatar_count() const { return avatar_count_; }
-  /// Returns the counters, including the excused poses of a disconnection at the end.
+  /// Returns the counters, including poses that are missing because of a disconnection at the end.
   [[nodiscard]] ObserverCounts Counts() const;
 
  private:
   /// State of an observed avatar.
   struct Seen {
     std::uint64_t tick = 0;        ///< Tick of the last pose on this connection; 0: none.
-    std::uint64_t root_tick = 0;   ///< Tick of the pose that `root_m` belongs to; 0: unknown.
+    std::uint64_t root_tick = 0;   ///< Tick of the pose to which `root_m` belongs; 0: unknown.
     std::uint64_t away_since = 0;  ///< First tick that was missed because of a drop; 0: none.
     Vec3 root_m = Vec3(0.0f);
   };
@@ -83,7 +83,7 @@ class Observer final : public Session {
     std::vector<Seen> seen;          ///< State of each observed avatar.
     std::uint64_t first_tick = 0;    ///< First tick on this connection; 0: none.
     protocol::CompactCodecs codecs;  ///< Codecs of compact poses.
-    /// Bytes of the last pose of each avatar, to detect changes. Used to measure latency.
+    /// Bytes of the last pose of each avatar, for detecting changes. Used to measure latency.
     std::vector<std::byte> last_poses;
     std::vector<std::size_t> last_sizes;
     std::size_t max_pose_bytes = 0;
@@ -98,9 +98,10 @@ class Observer final : public Session {
   void OnMessage(protocol::Message& message, std::size_t frame_bytes, std::int64_t now_ns) override;
   void OnLost(const std::string& why, bool by_us) override;
 
-  /// Selects the avatars of the `which`-th partial observer.
+  /// Selects the avatars of partial observer `which`.
   void SelectAvatars(std::size_t which);
-  /// Returns the index of an avatar in World::seen. Empty: it is not observed by this run.
+  /// Returns the index of an avatar in World::seen. Returns nullopt if this run does not observe
+  /// the avatar.
   [[nodiscard]] std::optional<std::size_t> IndexIn(const World& world,
                                                    protocol::AvatarId number) const;
   void OnWorldInfo(const protocol::WorldInfo& info);
@@ -111,8 +112,9 @@ class Observer final : public Session {
                    std::int64_t now_ns);
   void OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes, std::int64_t now_ns);
   void TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns);
-  /// Returns how many poses of an avatar are missing before `tick` because the connection was lost,
-  /// as far as they were due in the measured time and within the time allowed for reconnecting.
+  /// Returns how many poses of an avatar are missing before `tick` because the connection was lost.
+  /// Counts only poses that were due in the measured time and within the time allowed for
+  /// reconnecting.
   [[nodiscard]] std::uint64_t ExcusedBefore(const World& world, const Seen& seen,
                                             std::uint64_t tick) const;
   /// Checks that the tick of a batch increases. Returns false if the batch must be ignored.

@@ -15,7 +15,7 @@
 
 namespace stridewire::load {
 
-/// Distribution of N avatars over W worlds. Avatar k, 1 to N, is in world (k - 1) mod W and has id
+/// Distributes N avatars over W worlds. Avatar k, 1 to N, is in world (k - 1) mod W and has the id
 /// k.
 struct Layout {
   int avatars = 1;
@@ -29,7 +29,7 @@ struct Layout {
     return static_cast<std::uint32_t>(world) + 1 +
            static_cast<std::uint32_t>(i) * static_cast<std::uint32_t>(worlds);
   }
-  /// Returns whether this id belongs to an avatar of this run in that world.
+  /// Returns true if this id belongs to an avatar of this run in that world.
   [[nodiscard]] bool IsOurs(int world, std::uint32_t number) const {
     return number >= 1 && number <= static_cast<std::uint32_t>(avatars) &&
            (number - 1) % static_cast<std::uint32_t>(worlds) == static_cast<std::uint32_t>(world);
@@ -83,9 +83,9 @@ struct RunState {
   }
 
   const LoadOptions& options;
-  /// Choreography of the avatars. Null: they wander.
+  /// Choreography of the avatars. Null: the avatars wander.
   const Choreography* choreography;
-  /// Library for evaluating poses. Not null in mode movement.
+  /// Library for evaluating poses. Set in mode movement.
   const std::shared_ptr<const MotionLibrary> library;
   const Layout layout;
   TickWindow window;

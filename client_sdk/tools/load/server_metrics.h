@@ -21,13 +21,13 @@ struct ServerMetrics {
   double avatars = 0.0;
 };
 
-/// Parses the Prometheus text format 0.0.4. Sums samples of one name with different labels; for
-/// maxima it takes the largest. Fails with kMalformed (`index` is the line) or kNotFound (`where`
-/// is the missing metric).
+/// Parses the Prometheus text format 0.0.4. Samples with the same name and different labels are
+/// combined: maxima by their maximum, others by their sum. Fails with kMalformed (Error::index is
+/// the line) or kNotFound (Error::where is the missing metric).
 [[nodiscard]] Expected<ServerMetrics> ParseServerMetrics(std::string_view text);
 
-/// Reads the page over HTTP. Blocks for at most `timeout_s` + 1 s. Fails with kIo, where `where`
-/// has the address and the reason, and with the errors of ParseServerMetrics.
+/// Reads the page over HTTP. Blocks for at most `timeout_s` + 1 s. Fails with kIo, with the address
+/// and the reason in Error::where, and with the errors of ParseServerMetrics.
 [[nodiscard]] Expected<ServerMetrics> ScrapeServerMetrics(const Address& address, double timeout_s);
 
 /// Computes the durations of the ticks between two reads. Quantiles are interpolated within bins,

@@ -15,7 +15,7 @@ using asio::ip::tcp;
 
 constexpr double kFirstBackOffS = 0.1;
 constexpr double kMaxBackOffS = 2.0;
-/// Bytes to read from a socket before other sockets are served.
+/// Number of bytes to read from a socket before other sockets are served.
 constexpr std::size_t kMaxReadAtOnce = std::size_t{128} << 10;
 
 std::int64_t ToNs(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
@@ -82,7 +82,7 @@ void Session::Lose(const std::string& why) {
   state_ = State::kWaiting;
   back_off_s_ = std::clamp(2.0 * back_off_s_, kFirstBackOffS, kMaxBackOffS);
   deadline_ns_ = NowNs() + ToNs(back_off_s_);
-  // Report a loss once, not every failed attempt to reconnect.
+  // A loss is reported once. Failed attempts to reconnect are not reported.
   if (!std::exchange(is_loss_reported_, true)) OnLost(why, false);
 }
 

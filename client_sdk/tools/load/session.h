@@ -47,7 +47,7 @@ class Session {
  public:
   static constexpr std::size_t kMaxWaitingBytes = std::size_t{16}
                                                   << 20;  ///< Maximum number of unsent bytes.
-  /// Longest time from the attempt to connect to Welcome.
+  /// Maximum time from the attempt to connect to Welcome.
   static constexpr double kConnectTimeoutS = 5.0;
 
   Session(ThreadContext& context, boost::asio::ip::tcp::endpoint server, std::string name);
@@ -58,7 +58,7 @@ class Session {
   /// Connects to the server.
   void Open();
 
-  /// Sends Goodbye if ready, and closes the connection for good.
+  /// Sends Goodbye if ready, and closes the connection permanently.
   void Finish();
 
   /// Ends the session and connects again after `pause_s`.
@@ -93,8 +93,8 @@ class Session {
   /// the header.
   virtual void OnMessage(protocol::Message& message, std::size_t frame_bytes,
                          std::int64_t now_ns) = 0;
-  /// Called when the connection was lost or could not be established; `by_us` is true if Drop
-  /// caused it. The session reconnects. Failed attempts to reconnect cause no further call.
+  /// Called when the connection was lost or could not be established. `by_us` is true if Drop was
+  /// the cause. The session reconnects. Failed attempts to reconnect cause no further calls.
   virtual void OnLost(const std::string& why, bool by_us) = 0;
 
   /// Closes the connection because of an error and reconnects later.
@@ -118,7 +118,8 @@ class Session {
   const boost::asio::ip::tcp::endpoint server_;
   const std::string name_;
   State state_ = State::kNew;
-  /// Number of the connection. Handlers of earlier connections compare it and do nothing.
+  /// Number of the connection. Handlers of earlier connections compare it with their own and then
+  /// do nothing.
   std::uint64_t connection_ = 0;
   std::optional<boost::asio::ip::tcp::socket> socket_;
   std::optional<protocol::FrameReader> reader_;
@@ -128,7 +129,7 @@ class Session {
   protocol::Welcome welcome_;
   protocol::Seq next_seq_ = 1;
   std::uint64_t next_nonce_ = 1;
-  std::int64_t deadline_ns_ = 0;  ///< End of the timeout, or time of the next attempt.
+  std::int64_t deadline_ns_ = 0;  ///< Time of the timeout, or of the next attempt.
   std::int64_t received_ns_ = 0;
   std::int64_t sent_ns_ = 0;
   double back_off_s_ = 0.0;

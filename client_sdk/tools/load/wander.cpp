@@ -3,7 +3,7 @@
 namespace stridewire::load {
 namespace {
 
-// Approximate longest durations of movements in the known libraries.
+// Approximate maximum durations of movements in the known libraries.
 constexpr double kStepS = 0.75;
 constexpr double kJumpS = 2.5;
 constexpr double kClosingStepS = 1.5;
@@ -27,7 +27,7 @@ int SmallRandom::Integer(int min, int max) {
 }
 
 Wanderer::Wanderer(std::uint64_t seed, std::uint32_t avatar) : random_(seed) {
-  // Mix seed and avatar, so that neighbouring values do not yield shifted copies of one sequence.
+  // Mixes seed and avatar, so that neighbouring values do not yield shifted copies of one sequence.
   random_ = SmallRandom(random_.Next() ^ (std::uint64_t{avatar} * 0xd1342543de82ef95U));
 }
 

@@ -35,8 +35,8 @@ struct WanderPlan {
 /// Plans random movements of an avatar: 6 to 16 steps with turns and sometimes a pause, or a jump.
 ///
 /// The plan does not depend on the server (open loop). A slow server therefore receives as many
-/// requests as a fast one, and its delays become visible. The period lets every avatar come to a
-/// stand, so that each plan starts from standing.
+/// requests as a fast one, and its delays become visible. The period is long enough for every
+/// avatar to come to a stand, so that each plan starts from a stand.
 class Wanderer {
  public:
   Wanderer(std::uint64_t seed, std::uint32_t avatar);

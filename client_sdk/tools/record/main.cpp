@@ -48,8 +48,8 @@ bool ParseAddress(const std::string& text, Options& options) {
   return true;
 }
 
-/// Checks, before recording, whether the file can be written. Returns the problem, or an empty
-/// text.
+/// Checks, before recording, whether the file can be written. Returns the problem, or an empty text
+/// if it can.
 std::string OutputError(const std::filesystem::path& path) {
   std::error_code ignored;
   const auto status = std::filesystem::status(path, ignored);

@@ -133,7 +133,8 @@ class Recorder {
     recording_.clip.joint_count = recording_.skeleton.joint_count();
     hz_ = skeleton.tick_hz;
     const double frames = std::max(1.0, std::round(options_.seconds * hz_));
-    // Too many frames. The limit is necessary because the tick rate comes from the server.
+    // There are too many frames. The limit is necessary because the server determines the tick
+    // rate.
     if (frames > kMaxFrames) {
       return Fail(ErrorCode::kLimitExceeded, "too many frames", "--seconds",
                   static_cast<std::int64_t>(frames));
@@ -198,7 +199,7 @@ class Recorder {
   }
 
   /// Adds frames for the time between the last pose and this one, which is `ticks` later. They are
-  /// interpolated linearly, or repeat the last pose before a discontinuity.
+  /// interpolated linearly. Before a discontinuity, they repeat the last pose.
   void Fill(std::uint64_t ticks) {
     Clip& clip = recording_.clip;
     const int from = frame_count() - 1;

@@ -21,7 +21,7 @@ struct Options {
   std::uint32_t avatar = 0;
   double seconds = 0.0;
   stridewire_pose_mode mode = STRIDEWIRE_FULL;
-  double timeout_s = 10.0;  ///< Longest time to wait for the connection, the avatar and each pose.
+  double timeout_s = 10.0;  ///< Maximum time to wait for the connection, the avatar and each pose.
   std::string token;
   /// Folder that caches libraries for STRIDEWIRE_MOVEMENT. Empty: no cache.
   std::string library_folder;
@@ -50,19 +50,20 @@ struct Recording {
   /// Runs of missing frames; at most kMaxGaps of them are listed.
   std::vector<Gap> gaps;
   std::uint64_t discontinuities = 0;
-  /// Restarts of the server. Ticks of the new server are unrelated to those before, so the gap has
-  /// as many frames as the time without poses has ticks. They repeat the last pose.
+  /// Restarts of the server. The ticks of the new server are unrelated to those before. The gap
+  /// therefore gets a number of frames that corresponds to the time without poses. These frames
+  /// repeat the last pose.
   std::vector<Restart> restarts;
   std::uint64_t bytes_received = 0;
-  std::string cut_short;  ///< Reason why the recording is too short. Empty: it is complete.
+  std::string cut_short;  ///< Why the recording is shorter than requested. Empty: it is complete.
 };
 
 inline constexpr std::size_t kMaxGaps = 1000;
 
 /// Records one avatar for `seconds` of server time, counted in ticks from the first received pose.
-/// If the server restarts, the recording continues when the avatar is back. Waits for nothing
-/// longer than `timeout_s`. Calls `progress`, unless it is empty, with the number
-/// of recorded seconds. Fails with kIo if there is no connection or no such avatar.
+/// If the server restarts, the recording continues when the avatar is back. Waits at most
+/// `timeout_s` for anything. Calls `progress`, unless it is empty, with the number of recorded
+/// seconds. Fails with kIo if there is no connection or no such avatar.
 [[nodiscard]] Expected<Recording> Record(const Options& options,
                                          const std::function<void(double)>& progress);
 

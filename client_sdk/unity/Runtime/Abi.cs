@@ -214,8 +214,8 @@ namespace Stridewire
         Rejected = 2,
         /// <summary>REJECTED: stridewire_client_cancel or a teleport dropped the request.</summary>
         Cancelled = 3,
-        /// <summary>REJECTED or FINISHED: a request with an interrupt dropped this one, or cut its
-        /// movement short.</summary>
+        /// <summary>REJECTED or FINISHED: a request with an interrupt dropped this request, or cut
+        /// its movement short.</summary>
         Replaced = 4,
         /// <summary>REJECTED: the avatar was removed.</summary>
         Removed = 5,

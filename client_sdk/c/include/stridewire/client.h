@@ -61,7 +61,8 @@ const char* stridewire_version(void);
 /// A connection to one server, with its worlds, queues and received poses.
 typedef struct stridewire_client stridewire_client;
 
-/// Number of a joined world, from 1. The library assigns it, and it stays valid across reconnects.
+/// Number of a joined world, starting at 1. The library assigns it. It stays valid across
+/// reconnects.
 typedef uint32_t stridewire_world;
 
 /// Settings of a client. Call stridewire_client_options_init to fill in the defaults.
@@ -74,7 +75,7 @@ typedef struct stridewire_client_options {
   /// Maximum number of unanswered commands, 1 to 2^20. Further commands fail with COMMANDS_FULL.
   /// Default 4096.
   uint32_t max_commands;
-  /// Poses stored per avatar, 2 to 4096. Default 32.
+  /// Number of poses stored per avatar, 2 to 4096. Default 32.
   uint32_t pose_history;
   /// Memory for unanswered commands in bytes, at least 64 KiB. Default 64 MiB.
   size_t max_command_bytes;
@@ -89,9 +90,9 @@ typedef struct stridewire_client_options {
   /// Interval of pings in seconds, 0.01 to 600. The client shortens it to a third of the server's
   /// idle timeout. Default 1.
   double ping_interval_s;
-  /// Seed for the random part of reconnect delays. 0 takes a random seed. Default 0.
+  /// Seed for the random part of reconnect delays. 0: the client chooses a random seed. Default 0.
   uint64_t seed;
-  /// Name in the server's log, 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
+  /// Name for the server's log, 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
   const char* client_name;
   /// Secret that the server may require, at most 4096 bytes, or NULL.
   const char* auth_token;
@@ -128,11 +129,11 @@ typedef struct stridewire_address {
   uint16_t port;     ///< Not 0.
 } stridewire_address;
 
-/// Same as stridewire_client_connect, with the addresses of `count` servers that offer the same
+/// Same as stridewire_client_connect, but with the addresses of `count` servers that offer the same
 /// worlds, 1 to STRIDEWIRE_MAX_ADDRESSES. The client tries them in order, and waits between
 /// attempts only after all of them have failed. After a lost connection it first tries the same
-/// address again, because only that server can resume the session. After a server has announced
-/// its shutdown, it begins with the next address. If there are several addresses, the texts of
+/// address again, because only that server can resume the session. After a server has announced its
+/// shutdown, the client starts with the next address. If there are several addresses, the texts of
 /// CONNECT_FAILED and CONNECTION_LOST begin with the address.
 stridewire_status stridewire_client_connect_any(stridewire_client* client,
                                                 const stridewire_address* addresses, size_t count);
@@ -177,9 +178,9 @@ typedef enum stridewire_role {
   STRIDEWIRE_ROLE_MAX = 0x7fffffff
 } stridewire_role;
 
-/// Joins a world. `world` receives a number that further calls may use at once: the client holds
-/// back their commands until the server has accepted the join. Fails with ALREADY_JOINED if this
-/// name is joined, and with LIMIT_REACHED beyond 256 worlds.
+/// Joins a world. `world` receives a number that further calls may use at once: the client delays
+/// their commands until the server has accepted the join. Fails with ALREADY_JOINED if this name is
+/// joined, and with LIMIT_REACHED beyond 256 worlds.
 stridewire_status stridewire_client_join_world(stridewire_client* client, const char* name,
                                                stridewire_role role, stridewire_world* world,
                                                uint64_t* command);
@@ -351,7 +352,7 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
                                                const stridewire_layer* layers, size_t count,
                                                uint64_t* command);
 
-/// Foot planting of a group of avatars.
+/// Enables or disables foot planting for a list of avatars.
 typedef struct stridewire_planting {
   const uint32_t* avatars;  ///< Ids of the avatars.
   size_t avatar_count;      ///< Number of avatars, 1 to STRIDEWIRE_MAX_ITEMS.
@@ -525,7 +526,8 @@ typedef enum stridewire_outcome {
   STRIDEWIRE_OUTCOME_REJECTED = 2,  ///< REJECTED: the avatar could not execute the request.
   /// REJECTED: stridewire_client_cancel or a teleport dropped the request.
   STRIDEWIRE_OUTCOME_CANCELLED = 3,
-  /// REJECTED or FINISHED: a request with an interrupt dropped this one, or cut its movement short.
+  /// REJECTED or FINISHED: a request with an interrupt dropped this request, or cut its movement
+  /// short.
   STRIDEWIRE_OUTCOME_REPLACED = 4,
   STRIDEWIRE_OUTCOME_REMOVED = 5,  ///< REJECTED: the avatar was removed.
   STRIDEWIRE_OUTCOME_MAX = 0x7fffffff
@@ -549,7 +551,7 @@ typedef struct stridewire_event {
   int32_t group;         ///< Index of the motion group in the library, or -1.
   uint8_t resumed;       ///< 1: the session survived the reconnect.
   uint8_t extrapolated;  ///< 1: `applied` lies outside the range of the examples.
-  /// 1: `applied` differs from `requested`, which is out of reach. ACCEPTED: the library cannot
+  /// 1: `applied` differs from `requested`, which is out of reach. In ACCEPTED: the library cannot
   /// walk at the requested speed.
   uint8_t clamped;
   uint8_t cut_short;  ///< 1: another request interrupted the movement.
@@ -563,7 +565,8 @@ typedef struct stridewire_event {
   uint64_t dropped_events;          ///< Event messages that the server has dropped since the join.
   uint64_t events_dropped_before;  ///< Events that the full queue dropped directly before this one.
   char text[STRIDEWIRE_MAX_TEXT_BYTES];
-  double missed_m;  ///< Distance between the requested place and the nearest one in reach, metres.
+  /// Distance between the requested place and the nearest one in reach, in metres.
+  double missed_m;
   /// Angle between the requested and the nearest direction, or between the headings, whichever is
   /// larger.
   double missed_rad;
@@ -574,7 +577,7 @@ typedef struct stridewire_event {
   double nearest_height_m;
   double nearest_turn_rad;
   double nearest_heading_rad;  ///< Heading of the foot at `position_m`, or of the avatar (jump).
-  /// ACCEPTED: the walking speed of the library that is nearest to the requested one. End of a
+  /// ACCEPTED: the walking speed of the library that is closest to the requested one. End of a
   /// walk: its mean speed without the first and the last steps. 0: unknown.
   double speed_m_s;
   /// How the request ended. Every request that the server has accepted has exactly one event in
@@ -676,8 +679,8 @@ stridewire_status stridewire_client_get_terrain(stridewire_client* client, strid
                                                 stridewire_terrain* terrain,
                                                 const stridewire_terrain_buffers* buffers);
 
-/// Lists the avatars whose poses arrive, in ascending order of their ids. Writes up to `capacity`
-/// ids; `count` receives the total. `avatars` may be NULL if `capacity` is 0. Returns
+/// Lists the avatars whose poses the client receives, in ascending order of their ids. Writes up to
+/// `capacity` ids; `count` receives the total. `avatars` may be NULL if `capacity` is 0. Returns
 /// BUFFER_TOO_SMALL if the total exceeds `capacity`.
 stridewire_status stridewire_client_list_avatars(stridewire_client* client, stridewire_world world,
                                                  uint32_t* avatars, size_t capacity, size_t* count);
@@ -695,16 +698,18 @@ stridewire_status stridewire_client_render_time(stridewire_client* client, doubl
 
 /// How the display follows the connection. Times are 0 before the first pose.
 typedef struct stridewire_playout {
-  double delay_s;               ///< Delay of the render time behind the server time.
-  double target_delay_s;        ///< The delay that `delay_s` approaches.
-  double interval_s;            ///< Longest interval of the observed poses, at most 0.25 s.
-  double jitter_s;              ///< Mean lateness of pose messages relative to the fastest one.
-  double worst_jitter_s;        ///< Largest lateness of the last 4 s.
-  double newest_age_s;          ///< Server time that has passed since the newest pose message.
-  uint64_t displayed_poses;     ///< Number of sampled poses.
-  uint64_t extrapolated_poses;  ///< Those after the newest pose, whose motion continued.
-  uint64_t held_poses;          ///< Those after the newest pose that had stopped.
-  uint64_t jumps;               ///< Jumps of the render time within a session.
+  double delay_s;            ///< Delay of the render time behind the server time.
+  double target_delay_s;     ///< The delay that `delay_s` approaches.
+  double interval_s;         ///< Longest interval of the observed poses, at most 0.25 s.
+  double jitter_s;           ///< Mean lateness of pose messages relative to the fastest one.
+  double worst_jitter_s;     ///< Largest lateness of the last 4 s.
+  double newest_age_s;       ///< Server time that has passed since the newest pose message.
+  uint64_t displayed_poses;  ///< Number of sampled poses.
+  /// Number of sampled poses after the newest pose, whose motion continued.
+  uint64_t extrapolated_poses;
+  /// Number of sampled poses after the newest pose, whose motion had stopped.
+  uint64_t held_poses;
+  uint64_t jumps;  ///< Jumps of the render time within a session.
 } stridewire_playout;
 
 /// Gets the state of the display.

@@ -5,7 +5,7 @@
 #define STRIDEWIRE_MAX_NAME_BYTES 64
 /// Size of the text in an event, including the terminating 0. Longer texts are truncated.
 #define STRIDEWIRE_MAX_TEXT_BYTES 160
-/// Maximum number of addresses of a server.
+/// Maximum number of server addresses of a client.
 #define STRIDEWIRE_MAX_ADDRESSES 16
 /// Maximum number of spawns, avatars or movements per call.
 #define STRIDEWIRE_MAX_ITEMS 65536
