@@ -1,10 +1,10 @@
-# Builds build/client.wasm: core's runtime, the protocol and the session of the C++ client,
+# Builds build/client.wasm: the runtime of core, the protocol and the session of the C++ client,
 # compiled to WebAssembly. It uses the same sources as the native libraries, in the same unity
-# groups, without those that need threads, sockets or files.
+# groups, except sources that need threads, sockets or files.
 find_program(STRIDEWIRE_WASM_CXX clang++-19 REQUIRED)
 
-# Debian's headers for wasm32-wasi must not mix with the others in /usr/include, so the
-# header-only libraries get a folder of their own.
+# Debian's headers for wasm32-wasi must not be mixed with the other headers in /usr/include, so the
+# header-only libraries get a separate folder.
 set(wasm_dir ${CMAKE_CURRENT_BINARY_DIR}/wasm)
 file(MAKE_DIRECTORY ${wasm_dir}/include)
 foreach(header glm hwy flatbuffers xxhash.h xxh3.h)
@@ -78,8 +78,8 @@ stridewire_wasm_object(compact_kernel ${PROJECT_SOURCE_DIR}/protocol/src/compact
 stridewire_wasm_object(quantise_kernel ${PROJECT_SOURCE_DIR}/protocol/src/quantise_kernel.cpp)
 stridewire_wasm_object(pose_kernels ${PROJECT_SOURCE_DIR}/core/src/runtime/pose/pose_kernels.cpp)
 
-# A stack overflow stops the module instead of overwriting data, because the stack is first in
-# memory.
+# The stack is at the start of the memory, so a stack overflow stops the module instead of
+# overwriting data.
 set(web_wasm ${CMAKE_CURRENT_SOURCE_DIR}/build/client.wasm)
 add_custom_command(OUTPUT ${web_wasm}
   COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_CURRENT_SOURCE_DIR}/build

@@ -157,7 +157,7 @@ class Client:
         return events
 
     def playout(self) -> Playout:
-        """Describes the delay of sampled poses and how many arrived too late."""
+        """Returns the delay of sampled poses, and how many poses arrived too late."""
         raw = _abi.stridewire_playout()
         _check(_library.stridewire_client_get_playout(self._handle, c.byref(raw)))
         return Playout(raw.delay_s, raw.target_delay_s, raw.jitter_s, raw.newest_age_s,
@@ -169,7 +169,7 @@ class Client:
         return text.value.decode("utf-8", "replace")
 
     def _pump(self, patience_s: float) -> None:
-        """Waits for events, at most `patience_s`, and passes them to the watchers."""
+        """Waits for events for at most `patience_s`, and passes them to the watchers."""
         if not self._handle:
             raise StridewireError("closed", "the client is closed")
         status = _library.stridewire_client_wait_event(self._handle, patience_s)
@@ -188,7 +188,7 @@ class Client:
 
     def _wait(self, is_wanted: Callable[[Event], bool], what: str,
               timeout_s: float | None = None) -> Event:
-        """Waits for an event that arrives from now on."""
+        """Waits for an event that has not arrived yet."""
         found: list[Event] = []
 
         def watch(event: Event) -> None:
@@ -283,7 +283,7 @@ class World:
         self._command(_library.stridewire_client_remove, _ids(avatars), len(avatars))
 
     def avatars(self) -> list[int]:
-        """Returns the ids of the avatars whose poses arrive."""
+        """Returns the ids of the avatars whose poses the client receives."""
         count = c.c_size_t()
         ids = (c.c_uint32 * 0)()
         while _library.stridewire_client_list_avatars(
@@ -369,7 +369,7 @@ class World:
     # Layers.
 
     def layers(self) -> list[str]:
-        """Returns the names of the layers of the world's library, such as "wave"."""
+        """Returns the names of the layers of the world's library, for example "wave"."""
         names = (_abi.stridewire_layer_name * 64)()
         count = c.c_size_t()
         _check(_library.stridewire_client_list_layers(self.client._handle, self._handle, names,
@@ -386,7 +386,7 @@ class World:
 
     def observe(self, mode: PoseMode = PoseMode.QUANTISED, *, avatars: Iterable[int] = (),
                 every_n_ticks: int = 1, events: bool = False) -> int:
-        """Requests the poses of avatars, or of all. Returns the number of the subscription."""
+        """Subscribes to poses of avatars, or of all. Returns the number of the subscription."""
         ids = _ids(avatars)
         observation = _abi.stridewire_observation(
             mode=mode, every_n_ticks=every_n_ticks, with_events=events,
@@ -437,7 +437,7 @@ class World:
         return self._fill(_library.stridewire_client_latest_pose, avatar)
 
     def sample(self, avatar: int, time_s: float | None = None) -> Pose | None:
-        """Returns the pose at a server time, or at the render time. None if it is unknown."""
+        """Returns the pose at a server time, or at the render time. None if no pose is known."""
         if time_s is None:
             now = c.c_double()
             _check(_library.stridewire_client_render_time(self.client._handle, c.byref(now)))

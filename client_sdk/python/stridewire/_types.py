@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class EventType(enum.IntEnum):
-    """Type of an event. Those from ACCEPTED on are about an avatar."""
+    """Type of an event. Types from ACCEPTED on are about an avatar."""
 
     CONNECTED = 0
     CONNECT_FAILED = 1
@@ -74,7 +74,7 @@ class Interrupt(enum.IntEnum):
 
 
 class PoseMode(enum.IntEnum):
-    """How poses arrive: without loss, compressed, or evaluated by this client (without loss)."""
+    """Form of received poses: without loss, compressed, or evaluated here (without loss)."""
 
     FULL = 0
     QUANTISED = 1
@@ -163,15 +163,15 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class Playout:
-    """How the sampled poses follow the connection. Times are 0 before the first pose."""
+    """How the display follows the connection. Times are 0 before the first pose."""
 
     delay_s: float  #: Delay of the render time behind the server time.
     target_delay_s: float  #: The delay that `delay_s` approaches.
     jitter_s: float  #: Mean lateness of pose messages relative to the fastest one.
     newest_age_s: float  #: Server time that has passed since the newest pose message.
     displayed_poses: int  #: Number of sampled poses.
-    extrapolated_poses: int  #: Those after the newest pose, whose motion continued.
-    held_poses: int  #: Those after the newest pose that had stopped.
+    extrapolated_poses: int  #: Sampled poses after the newest one, still in motion.
+    held_poses: int  #: Sampled poses after the newest one, after it had stopped.
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ class Pose:
     root_position_m: NDArray[np.float32]  #: Shape (3,), in the world.
     #: Shape (joints, 4). The first rotation is in the world, the others relative to the parent.
     rotations_xyzw: NDArray[np.float32]
-    discontinuity: bool  #: RAW: True if one must not interpolate between the pose before and this.
+    discontinuity: bool  #: RAW: True if the previous pose must not be interpolated with this one.
     standing: bool  #: True: the avatar stands and has no request.
     #: Number of the continuous motion, also of sampled poses. Poses of different segments must not
     #: be blended, because the avatar has teleported or the client has reconnected in between.

@@ -1,4 +1,4 @@
-"""Pictures of recorded walks. A notebook shows the result of `plot_walk` by itself."""
+"""Pictures of recorded walks. Notebooks display the result of `plot_walk` automatically."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Picture:
 
 
 def plot_walk(recording: Recording) -> Picture:
-    """Draws the path of the root and the places where feet landed, seen from above.
+    """Draws the path of the root and the positions where feet landed, seen from above.
 
     +z is to the right and +x is up, so a figure with heading 0 walks to the right.
     """

@@ -149,7 +149,7 @@ namespace Stridewire
         }
 
         /// <summary>Starts to connect to one of up to 16 servers that offer the same worlds. The
-        /// client tries them in order, and again when it has lost the connection.</summary>
+        /// client tries them in order. It does so again after it has lost the connection.</summary>
         public void Connect(params ServerAddress[] servers)
         {
             var hosts = new GCHandle[servers.Length];
@@ -183,7 +183,7 @@ namespace Stridewire
             Check(Abi.stridewire_client_disconnect(Handle));
         }
 
-        /// <summary>Joins a world. Its methods may be called at once: the client holds back their
+        /// <summary>Joins a world. Its methods may be called at once: the client delays their
         /// commands until the server has accepted the join.</summary>
         public World Join(string name, Role role = Role.Controller)
         {

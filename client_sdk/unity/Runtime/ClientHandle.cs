@@ -4,7 +4,7 @@ using System.Runtime.InteropServices;
 namespace Stridewire
 {
     /// <summary>Owns a native client. The runtime frees it after the last call on it has returned,
-    /// also if the Client is disposed or collected during a call.</summary>
+    /// even if the Client is disposed or collected during a call.</summary>
     internal sealed class ClientHandle : SafeHandle
     {
         internal ClientHandle(IntPtr client) : base(IntPtr.Zero, true)

@@ -2,7 +2,7 @@ using System.Collections.Generic;
 
 namespace Stridewire
 {
-    /// <summary>A bone of a humanoid rig and the joint that turns it. The names of the joints are
+    /// <summary>A bone of a humanoid rig and the joint that rotates it. The names of the joints are
     /// those of the generated library, which many captures share.</summary>
     public sealed class HumanoidBone
     {
@@ -23,8 +23,8 @@ namespace Stridewire
 
         public string Joint { get; private set; }
 
-        /// <summary>The bone at the end of this one, or null if rig and skeleton agree about the
-        /// direction of this bone in their rest poses.</summary>
+        /// <summary>The bone at the end of this one, or null if the direction of this bone in the
+        /// rest pose is the same in rig and skeleton.</summary>
         public string EndBone { get; private set; }
 
         public string EndJoint { get; private set; }

@@ -2,7 +2,7 @@ using System;
 
 namespace Stridewire
 {
-    /// <summary>A bone of a rig and the joint that turns it.</summary>
+    /// <summary>A bone of a rig and the joint that rotates it.</summary>
     public struct RigBone
     {
         /// <summary>Index of the joint in the skeleton.</summary>

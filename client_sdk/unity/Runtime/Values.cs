@@ -75,7 +75,7 @@ namespace Stridewire
             if (lengths < 1e-12) return Identity;
             double w = lengths + Dot(from, to);
             Position axis = Cross(from, to);
-            if (w < 1e-6 * lengths)  // Opposite directions: turn about any perpendicular axis.
+            if (w < 1e-6 * lengths)  // Opposite directions: rotate about any perpendicular axis.
             {
                 w = 0.0;
                 axis = Math.Abs(from.X) < Math.Abs(from.Y) ? new Position(0, -from.Z, from.Y)
@@ -155,9 +155,10 @@ namespace Stridewire
         public double NewestAgeS;
         /// <summary>Number of sampled poses.</summary>
         public ulong DisplayedPoses;
-        /// <summary>Sampled poses after the newest one, whose motion continued.</summary>
+        /// <summary>Sampled poses after the newest received one, whose motion continued.</summary>
         public ulong ExtrapolatedPoses;
-        /// <summary>Sampled poses after the newest one that had stopped.</summary>
+        /// <summary>Sampled poses after the newest received one, whose motion had
+        /// stopped.</summary>
         public ulong HeldPoses;
     }
 

@@ -151,8 +151,8 @@ namespace Stridewire
             return Request(ref m);
         }
 
-        /// <summary>Requests a walk to a position and heading, at most 64 waypoints on the way.
-        /// </summary>
+        /// <summary>Requests a walk to a position and heading, through at most 64
+        /// waypoints.</summary>
         public ulong WalkTo(uint avatar, Position at, double headingRad = 0.0,
                             Position[] waypoints = null, double? speedMS = null,
                             Interrupt interrupt = Interrupt.Queued)
@@ -172,8 +172,8 @@ namespace Stridewire
 
         // Poses.
 
-        /// <summary>Requests the poses of avatars, or of all if avatars is null. Returns the number
-        /// of the subscription.</summary>
+        /// <summary>Subscribes to the poses of some avatars, or of all if avatars is null. Returns
+        /// the number of the subscription.</summary>
         public uint Observe(PoseMode mode = PoseMode.Quantised, uint[] avatars = null,
                             int everyNTicks = 1, bool withEvents = false)
         {
@@ -200,9 +200,9 @@ namespace Stridewire
             return command;
         }
 
-        /// <summary>Samples a pose at a server time, see Client.TryGetRenderTime. The array
-        /// receives four numbers (x, y, z, w) per joint. The first rotation is relative to the
-        /// world, the others to the parent joint. Returns false if no pose is known. Allocates
+        /// <summary>Samples a pose at a server time (Client.TryGetRenderTime). Writes four numbers
+        /// (x, y, z, w) per joint to the array. The first rotation is relative to the world, the
+        /// others are relative to the parent joint. Returns false if no pose is known. Allocates
         /// nothing.</summary>
         public bool Sample(uint avatar, double timeS, float[] rotationsXyzw, out PoseInfo pose)
         {
@@ -227,8 +227,8 @@ namespace Stridewire
             }
         }
 
-        /// <summary>Gets the oldest stored pose after a tick, like Sample. The tick ulong.MaxValue
-        /// gets the oldest stored pose.</summary>
+        /// <summary>Gets the oldest stored pose after a tick, like Sample. With the tick
+        /// ulong.MaxValue, gets the oldest stored pose.</summary>
         public bool Next(uint avatar, ulong afterTick, float[] rotationsXyzw, out PoseInfo pose)
         {
             fixed (float* rotations = rotationsXyzw)
@@ -240,8 +240,8 @@ namespace Stridewire
             }
         }
 
-        /// <summary>Writes the ids of the avatars whose poses arrive. Returns their number, which
-        /// can exceed the length of the array.</summary>
+        /// <summary>Writes the ids of the avatars whose poses the client receives. Returns their
+        /// number, which can exceed the length of the array.</summary>
         public int ListAvatars(uint[] avatars)
         {
             UIntPtr count;
@@ -267,7 +267,7 @@ namespace Stridewire
                 buffers.joint_capacity = (UIntPtr)joints.Length;
                 Status status = Abi.stridewire_client_get_skeleton(
                     client.Handle, Id, &native, &buffers);
-                // The end sites do not fit, because there is no buffer for them.
+                // The end sites do not fit, because no buffer was passed for them.
                 if (status != Status.BufferTooSmall) Client.Check(status);
                 int count = (int)native.joint_count;
                 string[] names = new string[count];
@@ -285,8 +285,8 @@ namespace Stridewire
             }
         }
 
-        /// <summary>Returns the names of the layers of the world's library, such as "wave".
-        /// </summary>
+        /// <summary>Returns the names of the layers of the world's library, for example
+        /// "wave".</summary>
         public string[] GetLayers()
         {
             const int capacity = 64;

@@ -48,7 +48,7 @@ await build({
   sourcemap: true,
 });
 
-// The tools for tests are in the same file as the client, with which they share the WebAssembly
+// The tools for tests are in the same file as the client, because both share the WebAssembly
 // module.
 const tools = [...readFileSync(`${folder}/src/testing.ts`, 'utf8')
                    .matchAll(/^export function (\w+)/gm)].map((match) => match[1]);

@@ -7,25 +7,28 @@ import type {
 } from './client_types';
 import type {Role, World} from './types';
 
-/** Longest timer interval. Browsers delay timers of hidden pages, so long ones are not reliable. */
+/**
+ * Maximum interval of timers. Browsers delay timers of hidden pages, so long ones are not reliable.
+ */
 const maxTimerMs = 500;
-/** Largest number of addresses, as in the C API. */
+/** Maximum number of addresses, as in the C API. */
 const maxAddresses = 16;
-/** While the socket has more unsent bytes than this, the session keeps its commands. */
+/** If the socket has more unsent bytes than this, the session does not send further commands. */
 const maxBufferedBytes = 1 << 20;
 
 /**
  * A connection to a server.
  *
- * After `connect` the client reconnects automatically until `close` is called or the server refuses
- * it. The first attempt after a failure follows within 0.1 s. The delay doubles up to 5 s, and each
- * delay is shortened at random by up to half. With several addresses it tries them in order.
+ * After `connect`, the client reconnects automatically until `close` is called or the server
+ * refuses it. The first attempt after a failure follows within 0.1 s. The delay doubles up to 5 s,
+ * and each delay is shortened at random by up to half. If there are several addresses, the client
+ * tries them in order.
  *
- * While the connection is down, new commands wait. After a reconnect the server usually still has
- * the session. The client then sends commands without a reply again, and the server carries out
- * each command once. If the session is lost, because the server restarted or the outage was too
- * long, these commands fail with `session_lost`. The client then joins its worlds and starts its
- * subscriptions again.
+ * While there is no connection, new commands wait. After a reconnect, the server usually still has
+ * the session. The client then sends commands without a reply again, and the server executes each
+ * command once. If the session is lost, because the server was restarted or the interruption was
+ * too long, these commands fail with `session_lost`. The client then joins its worlds and starts
+ * its subscriptions again.
  *
  * Only the constructor throws. Promises of commands are never rejected.
  */
@@ -150,7 +153,7 @@ export class Client {
     return this.now() / 1000;
   }
 
-  /** Opens, feeds or closes the socket as the state of the session requires. */
+  /** Opens or closes the socket and sends output, as the state of the session requires. */
   private work(): void {
     if (this.working) return;
     this.working = true;

@@ -72,14 +72,16 @@ export interface ClientOptions {
   maxCommands?: number;
   /** Received poses to keep per avatar for interpolation, 4 to 4096. Default 32. */
   poseHistory?: number;
-  /** Memory limit in bytes of all these poses. Avatars that do not fit are left out and counted in
-   * `Statistics.posesRefused`. Default 256 MiB. */
+  /**
+   * Memory limit for all these poses, in bytes. Avatars that do not fit are ignored and counted in
+   * `Statistics.posesRefused`. Default 256 MiB.
+   */
   maxPoseBytes?: number;
   /** Length of `World.recording` in seconds, 0 to 3600. 0 disables recording. Default 20. */
   recordingS?: number;
   /** Memory limit in bytes of the poses in one world's recording. Default 192 MiB. */
   maxRecordingBytes?: number;
-  /** Limit of events in one world's recording, 1 to 2^24. Default 65536. */
+  /** Maximum number of events in one world's recording, 1 to 2^24. Default 65536. */
   maxRecordedEvents?: number;
   /**
    * Cache for the motion libraries of movement mode. `null`: no cache. Default: IndexedDB, shared
@@ -89,8 +91,10 @@ export interface ClientOptions {
   libraryCache?: LibraryCache | null;
   /** Time limit for opening the WebSocket, and again for the handshake, 0.1 to 600. Default 5. */
   connectTimeoutS?: number;
-  /** Time between pings, 0.05 to 600. The client never waits longer than a third of the server's
-   * idle timeout. Default 1. */
+  /**
+   * Time between pings, 0.05 to 600. The client shortens it to a third of the server's idle timeout
+   * if necessary. Default 1.
+   */
   pingIntervalS?: number;
   /** Seed for the random part of reconnect delays, 0 to 2^32 - 1. Default: random. */
   seed?: number;
@@ -116,8 +120,8 @@ export interface ClientListeners {
    */
   notice: (code: number, text: string) => void;
   /**
-   * Called when the connection failed or was lost. The client tries again unless its state is
-   * `closed`.
+   * Called when a connection attempt has failed or the connection was lost. The client tries again
+   * unless its state is `closed`.
    */
   error: (code: number, text: string) => void;
 }
@@ -176,7 +180,7 @@ export interface Statistics {
   interpolationDelayS: number;
   /** Samples after the newest received pose of their avatar whose motion continued. */
   extrapolatedSamples: number;
-  /** Samples after the newest received pose of their avatar that had stopped. */
+  /** Samples after the newest received pose of their avatar whose motion had stopped. */
   heldSamples: number;
   /** Mean time in nanoseconds to decode and store a pose. */
   decodeNsPerPose: number;

@@ -75,8 +75,8 @@ class IndexedDbCache implements LibraryCache {
       };
       request.onsuccess = () => {
         const database = request.result;
-        // Gives the connection up when the user deletes the data, or when a newer version of the
-        // page has to change the object stores. The next transaction opens the database again.
+        // Closes the connection when the user deletes the data, or when a newer version of the page
+        // must change the object stores. The next transaction opens the database again.
         database.onclose = database.onversionchange = () => {
           database.close();
           this.opened = null;

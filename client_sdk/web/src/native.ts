@@ -59,7 +59,7 @@ class Native {
   private memory = new Uint8Array(0);
 
   constructor(module: WebAssembly.Module) {
-    // The module prints only if an invariant is broken, and then stops.
+    // The module prints only before it stops because of a broken invariant.
     const instance = new WebAssembly.Instance(module, {wasi_snapshot_preview1: {
       fd_write: (_fd: number, list: number, count: number, writtenAt: number): number => {
         const view = new DataView(this.call.memory.buffer);
@@ -90,7 +90,7 @@ class Native {
   /** The text that the last call has set. */
   get text(): string {
     const {results} = this;
-    // The text is copied first, because browsers do not decode text in memory that can grow.
+    // The text is copied first, because browsers cannot decode text in memory that can grow.
     const at = results[textAt]!;
     return decoder.decode(this.memory.slice(at, at + results[textBytes]!));
   }
@@ -119,7 +119,7 @@ class Native {
     return bytes.length;
   }
 
-  /** If the module has stopped, returns an error that contains the text that it has printed. */
+  /** If the module has stopped, returns an error that contains the text that the module printed. */
   explain(error: unknown): unknown {
     if (!(error instanceof WebAssembly.RuntimeError)) return error;
     const explained = new Error(`Stridewire's WebAssembly module has stopped: ${
@@ -145,7 +145,7 @@ if (typeof WebAssembly === 'undefined') {
       'Chrome 91, Firefox 89, Safari 16.4, Node.js 18 or newer';
 } else {
   try {
-    // Browsers compile large modules on their main thread only asynchronously.
+    // On their main thread, browsers compile large modules only asynchronously.
     loaded = new Native(await WebAssembly.compile(moduleBytes));
   } catch (error) {
     failure = `@stridewire/client cannot compile its WebAssembly module: ${String(error)}`;
@@ -166,7 +166,10 @@ export function webNames(text: string): string {
   return text.replace(/_([a-z])/g, (_, letter: string) => letter.toUpperCase());
 }
 
-/** Views of the module's memory. A view is created again only if its place has changed. */
+/**
+ * Views of the module's memory. A view is created again only if the memory or the address has
+ * changed.
+ */
 export class MemoryView<T extends Float32Array | Uint32Array | Uint8Array> {
   private view: T;
 

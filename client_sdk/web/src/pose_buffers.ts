@@ -1,6 +1,9 @@
 import type {CrowdPose, Pose} from './types';
 
-/** Creates an output buffer for `World.sample`. It grows with the skeleton if necessary. */
+/**
+ * Creates an output buffer for `World.sample`. `World.sample` enlarges it if the skeleton has more
+ * joints.
+ */
 export function createPose(jointCount = 0): Pose {
   return {
     rotations: new Float32Array(4 * jointCount),
@@ -28,7 +31,7 @@ export function createCrowdPose(count = 0, jointCount = 0): CrowdPose {
   return out;
 }
 
-/** Grows `out` until `count` avatars fit into it. Keeps its contents. @internal */
+/** Enlarges `out` until `count` avatars fit into it. Keeps its contents. @internal */
 export function reserve(out: CrowdPose, count: number, jointCount: number): void {
   if (out.avatars.length < count) {
     // Allocates a quarter more than necessary, so that a growing crowd does not reallocate for

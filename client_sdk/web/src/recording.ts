@@ -12,7 +12,7 @@ export interface PoseRecording {
   clear(): void;
 }
 
-/** The last seconds of a world as received. */
+/** The last seconds of a world, as the client received them. */
 export class WorldRecording implements Recording {
   private eventList: WorldEvent[] = [];
   private firstEvent = 0;
@@ -42,7 +42,7 @@ export class WorldRecording implements Recording {
     this.firstEvent = 0;
   }
 
-  /** Adds an event and drops those that are too old or too many. */
+  /** Adds an event. Drops the oldest events if they are too old or too many. */
   addEvent(event: WorldEvent): void {
     if (this.lengthS <= 0) return;
     this.eventList.push(event);

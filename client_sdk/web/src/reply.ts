@@ -12,15 +12,18 @@ export function makeReply(code: number, text: string, message?: ReplyMessage): R
     ok: code === 0,
     code,
     status: statusName(code),
-    // If only items were refused, the session has taken the status of the first of them.
+    // If the server refused only items, the session has used the status of the first of them as
+    // `code`.
     text: text || items.find((item) => item.code === code)?.text || statusText(code),
     accepted: message?.accepted ?? 0,
     items,
   };
 }
 
-/** Makes the reply to a command that was not sent, because of this error. Throws the error if the
- * WebAssembly module has stopped, because then nothing works any more. */
+/**
+ * Makes the reply to a command that was not sent because of this error. Throws the error if the
+ * WebAssembly module has stopped, because then nothing works any more.
+ */
 export function refusal(error: unknown): Reply {
   if (error instanceof WebAssembly.RuntimeError) throw error;
   if (error instanceof StridewireError) return makeReply(error.code, error.message);

@@ -117,8 +117,7 @@ export class Session {
     return native().call.render_time(this.client, nowS);
   }
 
-  /** Starts to connect. Does nothing if already open. The network connects to one of the `urls`, by
-   * its index. */
+  /** Starts to connect. Does nothing if already open. `addressIndex` is an index in `urls`. */
   open(nowS: number, urls: readonly string[] = ['']): void {
     if (this.isOpen()) return;
     this.lastErrorText = '';
@@ -158,7 +157,7 @@ export class Session {
     return world;
   }
 
-  /** Sends the command that `make` returns. `make` throws if an argument is invalid. */
+  /** Sends the command that `make` returns. `make` throws an error if an argument is invalid. */
   command(world: WorldHandle, make: () => ClientMessage): Promise<Reply> {
     return new Promise((resolve) => this.run(() => {
       try {
@@ -207,7 +206,7 @@ export class Session {
         }
         const moved = {...active.message, region: commands.region(region, active.message.detail)};
         checkMessage(moved);
-        if (active.handle === 0) {  // It has never been sent.
+        if (active.handle === 0) {  // The subscription was never sent.
           resolve(makeReply(0, ''));
         } else {
           this.submit(world, {...moved, subscription: active.handle, replace: true}, resolve);
@@ -221,7 +220,7 @@ export class Session {
 
   private stopObserving(world: WorldHandle, id: number): Promise<Reply> {
     const active = world.subscriptions.get(id);
-    if (active !== undefined && active.handle === 0) {  // It has never been sent.
+    if (active !== undefined && active.handle === 0) {  // The subscription was never sent.
       world.subscriptions.delete(id);
       active.answer?.(makeReply(Status.cancelled, ''));
       return Promise.resolve(makeReply(0, ''));
@@ -305,7 +304,7 @@ export class Session {
     return native().results[1] !== 0;
   }
 
-  /** Increases with every connection, to recognise late frames of an old one. */
+  /** Increases with every connection, so that late frames of an old one are recognised. */
   get connectionNumber(): number {
     native().call.state(this.client, 0);
     return native().results[3]!;
@@ -480,7 +479,9 @@ export class Session {
 
   // ---- Events of the module.
 
-  /** Calls the module and handles what has happened. `frame` is what the server has sent. */
+  /**
+   * Calls the module and handles its events. `frame` is the frame that the server has sent, if any.
+   */
   private run(call: () => void, frame?: ArrayBuffer): void {
     try {
       call();
@@ -493,8 +494,10 @@ export class Session {
     this.notify();
   }
 
-  /** Loads libraries from the cache and stores new ones. Failures have no other effect than that
-   * the client fetches a library again. */
+  /**
+   * Loads libraries from the cache and stores new ones. If this fails, the client only has to fetch
+   * a library again.
+   */
   private takeLibraryRequests(): void {
     const {libraryCache: cache} = this.options;
     if (cache === null) return;
@@ -504,8 +507,8 @@ export class Session {
       const hash = native().text;
       if (request === 1) {
         // The promises below also handle exceptions of the cache. The timeout consists of several
-        // short timers: while a page is busy, a cache cannot answer, and only one of the timers can
-        // elapse.
+        // short timers. While a page is busy, the cache cannot answer, but only one of the timers
+        // can elapse.
         let timer: ReturnType<typeof setTimeout>;
         const wait = (seconds: number): void => {
           if (seconds === 0) this.onLibrary(hash, null);
@@ -538,7 +541,7 @@ export class Session {
   }
 
   private takeEvents(frame?: ArrayBuffer): void {
-    // Each frame is read at most once, and only if something in it concerns the user.
+    // Each frame is read at most once, and only if it contains something that concerns the user.
     let message: Message | null = null;
     const read = (): Message => message ??= readMessage(frame!);
     const type = frame === undefined ? 0 : typeOfFrame(frame);
@@ -572,7 +575,7 @@ export class Session {
           this.detach();
           break;
         case eventTypes.reply: {
-          // Other replies follow from the message, but it does not describe them.
+          // Other replies result from the message as well, but it does not describe them.
           const reply = frame !== undefined && command === this.answered
               ? read() as ReplyMessage : undefined;
           const pending = this.pending.get(command);
@@ -634,7 +637,7 @@ export class Session {
 
   private onEvents(message: Events): void {
     if (message.number !== 0n) {
-      // Ignore events that were sent again after a resume.
+      // Ignores events that were sent again after a resume.
       if (message.number <= this.lastEventsNumber) return;
       this.lastEventsNumber = message.number;
     }
@@ -671,7 +674,9 @@ export class Session {
     this.later(() => this.listeners.emit('notice', status, text || statusText(status)));
   }
 
-  /** The module has forgotten its worlds. They stay known here, so that `open` can restore them. */
+  /**
+   * The module has discarded its worlds. This class keeps them, so that `open` can restore them.
+   */
   private detach(): void {
     for (const world of [...this.worlds]) {
       world.handle = 0;
@@ -735,8 +740,10 @@ export class Session {
     this.notifications.push(notification);
   }
 
-  /** Calls listeners and promises. If a listener calls the session again, notifications of that
-   * call follow after the current ones. */
+  /**
+   * Calls listeners and resolves promises. If a listener calls the session, the notifications of
+   * that call follow after the current ones.
+   */
   private notify(): void {
     if (this.notifying) return;
     this.notifying = true;

@@ -13,8 +13,8 @@ export type Role = 'controller' | 'observer';
 /**
  * Precision of received poses.
  * - `full`: float32 values, exactly as the server computed them.
- * - `quantised`: about a quarter of the bytes; no joint or end site is off by more than 1 mm.
- *   Older servers send quantised poses of 40 % of the bytes of `full`.
+ * - `quantised`: about a quarter of the bytes. The error of each joint and end site is at most 1
+ *   mm. Poses of older servers have 40 % of the bytes of `full`.
  * - `movement`: the client evaluates movements with the world's motion library, which it fetches
  *   from the server first. The poses are exactly those of the server. A recording stores them with
  *   the precision of `quantised`.
@@ -27,7 +27,8 @@ export type PoseMode = 'full' | 'quantised' | 'movement';
  *   hands, toes and head.
  * - `root`: the root joint only.
  *
- * The client sets a joint that was left out to its reference rotation, which is typical for it.
+ * The client sets an omitted joint to its reference rotation, which is a typical rotation of that
+ * joint.
  */
 export type PoseDetail = 'all' | 'reduced' | 'root';
 /** Type of a requested movement. A walk is carried out as a series of steps. */
@@ -62,9 +63,9 @@ export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | '
 /**
  * State of a world.
  * - `pending`: the client will join the world as soon as it is connected.
- * - `joining`: the client has asked to join and waits for the reply.
+ * - `joining`: the client has sent the request to join and waits for the reply.
  * - `joined`: the client receives data and may send commands.
- * - `refused`: the server did not let the client join.
+ * - `refused`: the server refused the join.
  * - `left`: `World.leave` was called.
  */
 export type WorldState = 'pending' | 'joining' | 'joined' | 'refused' | 'left';
@@ -137,8 +138,8 @@ export interface TerrainBox {
 }
 
 /**
- * The ground of a world. Its height at a point is the largest of the height field and the boxes
- * there. The height field counts as 0 outside its grid, and if it is null.
+ * The ground of a world. Its height at a point is the maximum of the height field and the boxes
+ * there. Outside the grid of the height field, and if there is no height field, that height is 0.
  */
 export interface Terrain {
   readonly heightField: HeightField | null;
@@ -153,8 +154,10 @@ export interface SpawnItem {
   /** World position of the avatar's base frame. */
   positionM: Vec3;
   headingRad: number;
-  /** True moves an existing avatar there at once, instead of creating one. It drops its movements
-   * and requests, and stands. Needs `avatar`. Default false. */
+  /**
+   * True: an existing avatar is moved there at once, instead of creating one. It drops its
+   * movements and requests, and stands. Requires `avatar`. Default false.
+   */
   teleport?: boolean;
 }
 
@@ -180,8 +183,8 @@ export interface LayerRequest {
 }
 
 /**
- * A movement to add to an avatar's queue. Fields name the types that use them; other types ignore
- * them. Absent numbers are 0 unless stated otherwise.
+ * A movement to add to an avatar's queue. The comments state which types use a field; other types
+ * ignore it. Absent numbers are 0 unless stated otherwise.
  *
  * A step or jump is rejected when it is about to start if the motion library would miss its place
  * by more than 0.2 m, or its direction or heading by more than 60 degrees. The event `rejected`
@@ -213,8 +216,10 @@ export interface MovementRequest {
   allowNearest?: boolean;
   /** Walk: positions to pass on the way, at most 64. */
   waypointsM?: readonly Vec3[];
-  /** Walk: speed, 0.05 to 5. The avatar walks as close to it as the motion library allows, see
-   * `WorldEvent.speedMPerS`. Absent: a comfortable speed. */
+  /**
+   * Walk: speed, 0.05 to 5. The avatar walks at the closest speed that the motion library allows
+   * (`WorldEvent.speedMPerS`). Absent: a comfortable speed.
+   */
   speedMPerS?: number;
   /** Default `none`. */
   interrupt?: Interrupt;
@@ -273,7 +278,7 @@ export interface AvatarState {
   readonly queue: readonly QueuedRequest[];
   /** True if foot planting is enabled, see `World.setPlanting`. */
   readonly plantingEnabled: boolean;
-  /** Active layers, at most four. Later ones are blended over earlier ones. */
+  /** Active layers, at most four. Later layers are blended over earlier ones. */
   readonly layers: readonly PlayingLayer[];
 }
 
@@ -323,9 +328,9 @@ export interface CurrentMovement {
   readonly requested: Parameters;
   /** Parameters of the synthesized movement. */
   readonly applied: Parameters;
-  /** True if the applied parameters lie outside the range of the recorded examples. */
+  /** True if the applied parameters are outside the range of the recorded examples. */
   readonly extrapolated: boolean;
-  /** True if the requested parameters were limited to what is possible. */
+  /** True if the requested parameters are out of reach and were clamped. */
   readonly clamped: boolean;
   /** Blend weights, one per example of the group. They sum to 1. */
   readonly weights: Float32Array;
@@ -421,10 +426,12 @@ export interface WorldEvent {
   readonly requested: Parameters;
   /** Started: parameters of the synthesized movement. */
   readonly applied: Parameters;
-  /** Started: the applied parameters lie outside the range of the recorded examples. */
+  /** Started: the applied parameters are outside the range of the recorded examples. */
   readonly extrapolated: boolean;
-  /** Started: the requested parameters were limited to what is possible. Accepted: the motion
-   * library cannot walk at the requested speed. */
+  /**
+   * Started: the requested parameters are out of reach and were clamped. Accepted: the motion
+   * library cannot walk at the requested speed.
+   */
   readonly clamped: boolean;
   /** Finished: another request interrupted the movement before its end. */
   readonly cutShort: boolean;
@@ -613,9 +620,9 @@ export interface World {
   /** Starts to receive poses, and events if requested. At most 256 subscriptions per world. */
   observe(observation: Observation): Subscription;
   /**
-   * Returns what an avatar is doing, about one tick later. Rejects with a `StridewireError` if the
-   * avatar does not exist, the client is not connected, the reply
-   * takes longer than 10 s, or 64 calls are waiting already.
+   * Returns the state of an avatar, about one tick later. Rejects with a `StridewireError` if the
+   * avatar does not exist, the client is not connected, the reply takes longer than 10 s, or 64
+   * calls are already pending.
    */
   inspect(avatar: number): Promise<AvatarState>;
   /** Leaves the world. The object cannot be used afterwards; join the world again instead. */
@@ -624,7 +631,10 @@ export interface World {
   /** Calls `listener` for each event of that name. Returns a function that removes it. */
   on<K extends keyof WorldListeners>(name: K, listener: WorldListeners[K]): () => void;
 
-  /** Returns the ids of the avatars whose poses arrive, ascending. A change replaces the array. */
+  /**
+   * Returns the ids of the avatars whose poses the client receives, ascending. A change replaces
+   * the array.
+   */
   avatars(): Uint32Array;
   /** Computes the pose of an avatar at a server time, usually `Client.renderTimeS()`. */
   sample(avatar: number, timeS: number, out: Pose): PoseKind;

@@ -11,7 +11,7 @@ import {
 import type {Observe, WorldInfo} from '../generated/messages';
 import * as commands from './wire/commands';
 
-/** A subscription that the client keeps up across lost sessions. */
+/** A subscription that the client restores after lost sessions. */
 export interface ActiveSubscription {
   message: Observe;
   /** Number in the module; 0 if the client is not connected. */
@@ -20,7 +20,10 @@ export interface ActiveSubscription {
   answer: ((reply: Reply) => void) | null;
 }
 
-/** A world, with the state that the session keeps for it. Users see the interface `World` only. */
+/**
+ * A world, with the state that the session keeps for it. Applications use only the interface
+ * `World`.
+ */
 export class WorldHandle implements World {
   state: WorldState = 'pending';
   skeleton: Skeleton | null = null;

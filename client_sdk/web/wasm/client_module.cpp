@@ -90,7 +90,7 @@ std::optional<protocol::Message> DecodeInput(std::size_t bytes, protocol::Sender
   return *std::move(message);
 }
 
-/// Opens the file of a library, which must have this hash.
+/// Opens the file of a library. Fails if its hash is not `hash`.
 Expected<std::shared_ptr<const MotionLibrary>> OpenLibrary(std::span<const std::byte> file,
                                                            const std::string& hash) {
   auto library = MotionLibrary::FromBytes(file);
@@ -100,8 +100,8 @@ Expected<std::shared_ptr<const MotionLibrary>> OpenLibrary(std::span<const std::
   return library;
 }
 
-/// Checks received libraries, which natively is the work of the network thread, and collects
-/// requests to the cache.
+/// Checks received libraries, and collects requests to the cache. In native clients, the network
+/// thread does this.
 void RunLibraryTasks(Client& client) {
   while (auto task = client.session.TakeLibraryTask()) {
     if (!task->file.empty()) {
@@ -297,7 +297,7 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.client_name = hello.client_name;
   options.auth_token = hello.auth_token;
   options.max_commands = static_cast<std::size_t>(numbers[0]);
-  // The end of a session adds a reply for each command in one call, and none of them may be lost.
+  // When a session ends, each command adds a reply in one call, and no reply may be lost.
   options.max_events += options.max_commands;
   options.pose_history = static_cast<std::size_t>(numbers[1]);
   // An address has 32 bits here.
@@ -334,9 +334,9 @@ STRIDEWIRE_EXPORT(open) void Open(Client* client, std::size_t bytes, double now_
 }
 STRIDEWIRE_EXPORT(close) void Close(Client* client, double now_s) { client->session.Close(now_s); }
 
-/// Returns the state, a Session::State. results: 0 the next time at which to call advance,
-/// 1 whether to start an attempt to connect, 2 whether the state needs a socket, 3 the number of
-/// the connection, 4 the number of bytes that wait to be sent, 5 the index of the address.
+/// Returns the state, a Session::State. results: 0 the next time at which to call advance, 1
+/// whether to start an attempt to connect, 2 whether the state needs a socket, 3 the number of the
+/// connection, 4 the number of unsent bytes, 5 the index of the address.
 STRIDEWIRE_EXPORT(state) std::uint32_t State(Client* client, double now_s) {
   const Session& session = client->session;
   results[0] = session.NextTime();
@@ -361,10 +361,10 @@ STRIDEWIRE_EXPORT(on_frame) double OnFrame(Client* client, std::size_t bytes, do
   return static_cast<double>(client->session.answered_command());
 }
 
-/// Returns 1 if the library whose hash is in the text should be loaded from the cache. Then call
-/// on_library. Returns 2 if a file should be stored in the cache under the hash in the text, and 0
-/// if there is nothing to do. results: 0 the address of the file, 1 its size. The file is valid
-/// until the next call.
+/// Returns 1 if the library whose hash is in the text should be loaded from the cache. In this
+/// case, call on_library. Returns 2 if a file should be stored in the cache under the hash in the
+/// text, and 0 if there is nothing to do. results: 0 the address of the file, 1 its size. The file
+/// is valid until the next call.
 STRIDEWIRE_EXPORT(take_library_request) std::uint32_t TakeLibraryRequest(Client* client) {
   client->stored_library = {};
   if (!client->libraries_to_load.empty()) {
@@ -381,9 +381,9 @@ STRIDEWIRE_EXPORT(take_library_request) std::uint32_t TakeLibraryRequest(Client*
   results[1] = static_cast<double>(client->stored_library.file.size());
   return 2;
 }
-/// Handles what the cache has loaded. `input` contains the hash and then the file, which has no
-/// bytes if the cache does not contain the library. Returns 1 if the file is the library of this
-/// hash. If not, the client fetches the library from the server.
+/// Handles a file that the cache has loaded. `input` contains the hash, followed by the file, which
+/// is empty if the cache does not contain the library. Returns 1 if the file is the library with
+/// this hash. If it is not, the client fetches the library from the server.
 STRIDEWIRE_EXPORT(on_library)
 bool OnLibrary(Client* client, std::size_t hash_bytes, std::size_t bytes) {
   const auto input = Input(hash_bytes + bytes);
@@ -397,7 +397,7 @@ bool OnLibrary(Client* client, std::size_t hash_bytes, std::size_t bytes) {
   return is_valid;
 }
 
-/// `input` contains a text of `bytes` bytes, which may be 0.
+/// `input` contains a text of `bytes` bytes. `bytes` may be 0.
 STRIDEWIRE_EXPORT(on_lost)
 void OnLost(Client* client, stridewire_status status, std::size_t bytes, double now_s) {
   const auto input = Input(bytes);
@@ -450,7 +450,7 @@ std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes)
   return Report(*client, status, command);
 }
 
-/// results: the numbers in the order in which they are written here, from 0 and from 16 on.
+/// results: the numbers in the order in which they are written here, starting at 0 and at 16.
 STRIDEWIRE_EXPORT(statistics) void Statistics(Client* client, double now_s) {
   const stridewire_statistics s = client->session.Statistics();
   const double numbers[] = {
@@ -489,7 +489,7 @@ STRIDEWIRE_EXPORT(render_time) double RenderTime(Client* client, double now_s) {
 
 // ---- worlds
 
-/// Returns the world with a number of the server, or 0.
+/// Returns the world with this id of the server, or 0.
 STRIDEWIRE_EXPORT(find_world) stridewire_world FindWorld(Client* client, std::uint32_t id) {
   return client->session.FindHandle(id);
 }
@@ -569,7 +569,7 @@ std::size_t SampleAll(Client* client, stridewire_world world, double time_s, boo
 
 }  // namespace stridewire::client
 
-/// Replaces the function of the C library, from which its allocator gets memory. Engines may copy
+/// Replaces the function from which the allocator of the C library gets memory. Engines may copy
 /// the whole memory when it grows, so it grows by a quarter instead of 64 KiB at a time.
 // NOLINTNEXTLINE(readability-identifier-naming): the name of the C library.
 extern "C" void* sbrk(std::intptr_t increment) {

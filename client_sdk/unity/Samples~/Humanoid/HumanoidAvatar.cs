@@ -3,10 +3,10 @@ using System.Collections.Generic;
 using Stridewire;
 using UnityEngine;
 
-/// <summary>Spawns an avatar and moves the humanoid rig of this object with its poses. If a goal is
-/// set, the avatar walks to it whenever it stands elsewhere. The rig must be in its T-pose and face
-/// its own +z when the object is enabled. It is scaled so that its legs are as long as those of the
-/// skeleton, because feet would slide otherwise.</summary>
+/// <summary>Spawns an avatar and animates the humanoid rig of this object with its poses. If a goal
+/// is set, the avatar walks there whenever it stands elsewhere. When the object is enabled, the rig
+/// must be in its T-pose and face its own +z. The rig is scaled so that its legs are as long as
+/// those of the skeleton, because otherwise feet would slide.</summary>
 [RequireComponent(typeof(Animator))]
 public sealed class HumanoidAvatar : MonoBehaviour
 {
@@ -75,7 +75,7 @@ public sealed class HumanoidAvatar : MonoBehaviour
         Vector3 to = goal.position - hips.position;
         if (to.x * to.x + to.z * to.z < GoalRadius * GoalRadius) return;
         Vector3 at = goal.position;
-        // Unity turns clockwise for positive angles, Stridewire counterclockwise.
+        // In Unity, positive angles turn clockwise; in Stridewire, counterclockwise.
         double heading = -goal.eulerAngles.y * Math.PI / 180.0;
         joined.WalkTo(avatar, UnitySpace.Convert(new Position(at.x, at.y, at.z)), heading);
         isIdle = false;
