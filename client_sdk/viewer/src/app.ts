@@ -95,7 +95,7 @@ export class App {
   /** Time for which the selected avatar has not been drawn. */
   private missingMs = 0;
   private lastSelectionCheckMs = 0;
-  /** The pane that the user clicked last. It receives commands if no avatar is selected. */
+  /** The pane that the user clicked last. If no avatar is selected, its world receives commands. */
   private activePane: WorldPane | null = null;
   /** True if the statistics panel was closed to make room for the inspector. */
   private statisticsClosed = false;

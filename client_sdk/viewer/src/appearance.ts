@@ -1,4 +1,4 @@
-// Drawing options of the scene: the user's choices, or what the quality level selects.
+// Drawing options of the scene. The user chooses them, or else the quality level does.
 
 import type {UrlOptions} from './url_options.js';
 import {Quality} from './quality.js';

@@ -22,7 +22,7 @@ export interface CommandHost {
   notify(text: string): void;
   /** Called after the queues of these avatars have been cleared. */
   onCancelled(pane: WorldPane, avatars: readonly number[]): void;
-  /** Shows in the panel that the world has none of the sample terrains. */
+  /** Updates the panel for a world with none of the sample terrains. */
   resetTerrainChoice(): void;
 }
 
@@ -239,10 +239,10 @@ export class AvatarCommands {
   }
 
   /**
-   * Stops all random walkers of the world if there are any. Otherwise it starts the selected
-   * avatar; without a selection, the avatars that this page has spawned; without those, or if
-   * commands go to all avatars, every avatar of the world. If the world is empty, it spawns new
-   * ones.
+   * Stops all random walkers of the world if there are any. Otherwise, it starts new ones: the
+   * selected avatar; without a selection, the avatars that this page has spawned; without those, or
+   * if commands go to all avatars, every avatar of the world. If the world is empty, it first
+   * spawns avatars.
    */
   toggleRandomWalk(): void {
     const pane = this.host.commandedPane();

@@ -1,4 +1,4 @@
-// Options for how the server sends avatars to the page, and measurements of their size.
+// Options for how the server sends avatars to the page, and the measured size of poses.
 
 import type {PoseDetail, PoseMode, Statistics} from './sdk.js';
 

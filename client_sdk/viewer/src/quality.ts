@@ -59,7 +59,7 @@ const longestRetryMs = 240_000;
 
 /**
  * With at most this number of avatars, a software renderer spends most of its time on the rest of
- * the page. Drawing lines would not help, so level 3 (bodies) is then the coarsest.
+ * the page. Lines would not be faster then, so level 3 (bodies) is the coarsest.
  */
 const smallCrowd = 24;
 const coarsestForSmallCrowd = 3;

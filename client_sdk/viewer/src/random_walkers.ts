@@ -25,7 +25,8 @@ export class RandomWalkers {
   }
 
   /**
-   * Starts to send movements to an avatar that stands at `x`, `z` (metres) and faces `headingRad`.
+   * Starts to request movements for an avatar that stands at `x`, `z` (metres) and faces
+   * `headingRad`.
    */
   add(avatar: number, x = 0, z = 0, headingRad = 0): void {
     if (this.walkers.has(avatar)) return;
@@ -33,7 +34,7 @@ export class RandomWalkers {
     this.requestMovements(avatar, x, z, headingRad);
   }
 
-  /** Stops sending movements to the avatar. It still performs those in its queue. */
+  /** Stops requesting movements for the avatar. It still performs those in its queue. */
   remove(avatar: number): void {
     this.walkers.delete(avatar);
   }

@@ -16,7 +16,7 @@ export function genericTime(keytimesS: ArrayLike<number>, timeS: number): number
 
 /**
  * Returns the last of `states`, which are sorted by time, that is not later than `timeS`. If all
- * are later, returns the first one; if there are none, null.
+ * are later, returns the first one. If there are none, returns null.
  */
 export function stateAt<T extends {readonly timeS: number}>(
   states: readonly T[], timeS: number): T | null {

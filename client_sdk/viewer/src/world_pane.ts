@@ -9,11 +9,11 @@ export interface WorldPane {
   subscription: Subscription | null;
   /** True if the server has accepted the subscription. */
   subscribed: boolean;
-  /** Avatars that this page moves at random; null until the first one. */
+  /** Avatars of this world that this page moves at random. Null until there are any. */
   randomWalkers: RandomWalkers | null;
   /** Ids of the avatars that this page has spawned. */
   readonly ownAvatars: Set<number>;
-  /** Reason why the server refused to let this page join the world; empty if it did not. */
+  /** Why the server refused to let this page join the world. Empty if it did not. */
   refusal: string;
 }
 

@@ -14,7 +14,7 @@ export interface LibraryEntry {
   readonly hash: string;
   readonly groups: readonly GroupEntry[];
 }
-/** A parameter, and its range over the group's examples. */
+/** A parameter and its range over the group's examples. */
 export interface Parameter {
   readonly name: string;
   readonly min: number;
@@ -75,13 +75,13 @@ export interface ErrorMap {
 /** Describes what avatars can do with a library. */
 export interface Summary {
   readonly summary: {
-    /** One sentence per sort of movement. */
+    /** One sentence per class of movements. */
     readonly sentences: readonly string[];
     readonly missing: readonly {readonly what: string; readonly advice: string}[];
   };
   readonly self_check: {
     readonly passed: boolean;
-    /** The whole result in one sentence. */
+    /** The overall result in one sentence. */
     readonly verdict: string;
     readonly checks: readonly {
       readonly title: string;

@@ -69,7 +69,7 @@ export class LibraryPage {
   private readonly legend = h('canvas',
     {class: 'legend', 'aria-hidden': 'true', width: 128, height: 1});
   private readonly legendText = h('span', {class: 'hint'});
-  /** Describes what the library can do. It is folded, so that the parameters have more room. */
+  /** Describes what the library can do. It is collapsed, so that the parameters have more room. */
   private readonly summaryArea = h('details', {class: 'library-summary', id: 'summary'});
   private readonly message = h('div', {class: 'notice', role: 'alert'});
   private readonly scrub = h('input', {
@@ -239,8 +239,8 @@ export class LibraryPage {
   }
 
   /**
-   * Requests the step for a site's parameters. If the site is an example, plays it beside that
-   * step; a pseudoexample has no movement of its own.
+   * Requests the step for a site's parameters. If the site is an example, also plays the example
+   * beside that step. A pseudoexample has no motion.
    */
   selectSite(index: number): void {
     const {group, library} = this;

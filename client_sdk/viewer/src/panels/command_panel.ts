@@ -207,7 +207,7 @@ export class CommandPanel {
     this.actions.walkTo(
       point.x, point.z, Number.isFinite(headingDeg) ? headingDeg * Math.PI / 180 : null);
   }
-  /** Shows that the world has none of the sample terrains. */
+  /** Updates the selection for a world with none of the sample terrains. */
   resetTerrainChoice(): void {
     this.terrainSelect.value = '';
   }

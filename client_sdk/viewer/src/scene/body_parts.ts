@@ -1,6 +1,7 @@
-// Finds which joints of a skeleton form the trunk, head, arms and legs, so that any skeleton can
-// have a body. It uses the rest pose, in which all skeletons face +Z with +Y up and all rotations
-// are identity, and the legs that the server names. Joint names only help to find the head.
+// Finds the joints of a skeleton that form trunk, head, arms and legs, so that a body can be built
+// for any skeleton. Uses the rest pose, in which all skeletons face +Z with +Y up and all rotations
+// are the identity, and the legs that the server reports. Joint names are used only to find the
+// head.
 
 /** Joint indices of a leg, -1 if unknown; offsets in metres in the frame of the ball's joint. */
 export interface LegLike {
@@ -223,8 +224,8 @@ export function findBodyParts(skeleton: SkeletonLike): BodyParts {
       let bestLength = 0;
       for (let i = 0; i + 1 < segments.length; ++i) {
         const l = segments[i]!.length + segments[i + 1]!.length;
-        // Of pairs of similar length, the last one is upper arm and forearm: a collar bone comes
-        // before them, and fingers are much shorter.
+        // Of pairs of similar length, the last one consists of upper arm and forearm. A collar bone
+        // comes before them, and fingers are much shorter.
         if (l > bestLength * 0.8) {
           bestLength = Math.max(l, bestLength);
           best = i;

@@ -1,5 +1,5 @@
-// The camera orbits a target. All views share the orbit's angles and distance, so that worlds
-// beside each other are seen from the same direction, but each view has its own target.
+// The camera orbits a target. All views share the orbit's angles and distance, so worlds beside
+// each other are seen from the same direction. Each view has its own target.
 
 import * as THREE from 'three';
 
@@ -58,8 +58,8 @@ export class ViewCamera {
   private readonly place = new THREE.Vector3();
 
   /**
-   * Aims at a place, at once or gradually. The target stays up to `slackM` behind the place, so
-   * that the view does not sway with an avatar that stands and shifts its weight.
+   * Aims at a position, at once or gradually. The target stays up to `slackM` behind the position,
+   * so that the view does not sway with a standing avatar that shifts its weight.
    */
   moveTo(x: number, y: number, z: number, atOnce = false): void {
     const place = this.place.set(x, y, z);

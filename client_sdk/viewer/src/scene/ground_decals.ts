@@ -136,8 +136,8 @@ export class GroundDecals {
     i: number, terrain: TerrainSurface, x: number, z: number, headingRad: number,
     halfSizeM: number, a: number, b: number, c: number, d: number): void {
     let y = terrain.heightAt(x, z);
-    // A decal is horizontal if it is large or the terrain has boxes. A large one is placed at the
-    // highest terrain beneath it.
+    // A decal is horizontal if it is large or the terrain has boxes. A large decal is placed at the
+    // height of the highest terrain beneath it.
     const large = halfSizeM > 0.3 && !terrain.isFlat;
     const level = large || terrain.hasBoxes;
     if (large) {
