@@ -15,8 +15,8 @@
 
 namespace stridewire::protocol {
 
-/// Position of a field: a chain of names that begins with the message. It becomes text only if an
-/// error is reported, so that a check which holds allocates nothing.
+/// Position of a field: a chain of names that begins with the message. It is converted to text only
+/// if an error is reported, so that successful checks allocate nothing.
 struct FieldPath {
   const FieldPath* parent = nullptr;
   std::string_view name;

@@ -4,8 +4,8 @@
 #include "codec_support.h"
 #include "request_fields.h"
 
-/// Encodes, decodes and checks what the schema's attributes cannot express: a requested movement,
-/// whose type decides which fields it uses, sets of parameters, and lists of movement records.
+/// Encodes, decodes and checks what the schema's attributes cannot express: requested movements,
+/// whose type determines the used fields; sets of parameters; and lists of movement records.
 namespace stridewire::protocol {
 
 namespace {

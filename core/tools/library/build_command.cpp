@@ -69,7 +69,7 @@ struct Captures {
   std::vector<FileConventions> conventions;  // Conventions of the readable files.
 };
 
-// Reads the files with options of their own. Returns nothing if the user interrupts the program.
+// Reads each file with its own options. Returns nullopt if the user interrupts the program.
 std::optional<Captures> ReadCaptures(const std::vector<std::string>& paths,
                                      const std::vector<BvhReadOptions>& read,
                                      const AssembleOptions& options, Progress& progress) {
@@ -99,8 +99,8 @@ std::optional<Captures> ReadCaptures(const std::vector<std::string>& paths,
   return captures;
 }
 
-// Reads all files so that they agree on up axis and unit. Files that disagree are rare, and are
-// found only after all files were read, so that it then reads all files again.
+// Reads all files so that they agree on up axis and unit. If files disagree, all files are read
+// again, because this is known only after the first pass. It is rare.
 std::optional<Captures> ReadAgreeingCaptures(const std::vector<std::string>& paths,
                                              const BvhReadOptions& read,
                                              const AssembleOptions& options, Progress& progress) {

@@ -12,7 +12,8 @@
 namespace stridewire {
 
 // Reports on a build. As text, it prints each part at once. As JSON, it collects all parts and
-// prints one object at the end, even if the build fails. The JSON contains all that the text says.
+// prints one object at the end, even if the build fails. The JSON contains everything that the text
+// contains.
 class BuildReport {
  public:
   explicit BuildReport(bool as_json);

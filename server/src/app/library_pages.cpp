@@ -22,7 +22,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Largest absolute value of a parameter, in metres or radians. Larger values are probably typos.
+// Maximum absolute value of a parameter, in metres or radians. Larger values are probably typos.
 constexpr double kMaxParameter = 20.0;
 
 // Rounds to 0.01 mm to save bytes.
@@ -126,8 +126,8 @@ class MovementPreview {
     }
   }
 
-  // Returns the scaled distance from the hull of the examples; `nearest` is the nearest point of
-  // it.
+  // Returns the scaled distance between the parameters and the hull of the examples. Writes the
+  // nearest point of the hull to `nearest`.
   double Project(const ParameterValues& p, double growth, ParameterValues& nearest) const {
     const auto d = static_cast<std::size_t>(p.count);
     nearest = p;

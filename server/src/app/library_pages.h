@@ -30,7 +30,8 @@ namespace stridewire::server {
 /// Thread-safe.
 class LibraryPages {
  public:
-  static constexpr int kMaxCells = 64;  ///< Cells along one side of the grid of errors.json.
+  /// Maximum number of cells along one side of the grid of errors.json.
+  static constexpr int kMaxCells = 64;
   static constexpr double kFramesPerS = 30.0;
 
   /// Adds a library. `name` is shown to users.

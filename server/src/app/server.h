@@ -57,7 +57,7 @@ class Server : public ServerThread {
   [[nodiscard]] std::string ReadyLine() const;
 
  private:
-  // ServerThread. Handle runs on the main thread.
+  // Implements ServerThread. Handle runs on the main thread.
   void Post(ServerMessage message) override;
   void Handle(ServerMessage&& message);
   void Join(JoinRequest&& request);

@@ -104,8 +104,8 @@ void Shard::Tick() {
   if (tick <= tick_) return;  // The timer has fired slightly early.
   metrics_.tick_late.Observe(std::chrono::duration<double>(begin - clock_.Due(tick)).count());
 
-  // A late tick is published once. Avatars catch up on the missed time, up to a limit. Beyond it,
-  // the time is lost, because catching up would delay the following ticks as well.
+  // A late tick is published once. Avatars catch up on the missed time, up to a limit. Time beyond
+  // the limit is lost, because catching up on it would delay the following ticks as well.
   const std::uint64_t missed = tick - tick_ - 1;
   const std::uint64_t caught_up =
       std::min(missed, static_cast<std::uint64_t>(config_.max_catch_up_ticks));
@@ -124,8 +124,8 @@ void Shard::Tick() {
   if (delayed_spawns > 0) metrics_.Reached(Limit::kSpawnsPerTick, delayed_spawns);
   for (auto& [id, world] : worlds_) world->Advance(tick, static_cast<int>(caught_up) + 1);
   AnswerRequests();
-  // The gauges are updated before replies are sent, so that a client that has received a reply
-  // finds matching metrics.
+  // The gauges are updated before replies are sent, so that a client sees its commands in the
+  // metrics as soon as it has received the replies.
   UpdateGauges();
   Publish();
 
@@ -347,7 +347,8 @@ void Shard::AdoptNow(Arrival&& arrival) {
   std::unique_ptr<Session>& session = sessions_[arrival.identity.id];
   const bool is_resumed = arrival.is_resuming && session != nullptr && !session->is_ended();
   if (session == nullptr || session->is_ended()) {
-    // The session ended while its client was reconnecting: create a new one with the same token.
+    // The session ended while its client was reconnecting. A new session with the same token is
+    // created.
     if (arrival.is_resuming) server_.Post(SessionRestored{index_, arrival.identity});
     session = std::make_unique<Session>(std::move(arrival.identity), *this);
   }
@@ -357,7 +358,7 @@ void Shard::AdoptNow(Arrival&& arrival) {
 }
 
 void Shard::DestroySession(SessionId session) {
-  // The session may be calling this function, so post its destruction.
+  // The session may be calling this function, so its destruction is posted.
   asio::post(context_, [this, session] {
     const auto it = sessions_.find(session);
     if (it == sessions_.end() || !it->second->is_ended()) return;

@@ -30,8 +30,8 @@ std::string NumberText(double value) {
   char buffer[32];
   const auto result = std::to_chars(buffer, buffer + sizeof(buffer), value);
   std::string text(buffer, result.ptr);
-  // Formats a float such that it contains a point or an exponent. TOML distinguishes floats from
-  // integers; the reader accepts both.
+  // Formats a float so that it contains a point or an exponent. TOML distinguishes floats from
+  // integers, although the reader accepts both.
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
   return text;
 }

@@ -22,10 +22,10 @@ struct Limits {
   int max_sessions = 1024;  ///< Maximum number of attached and detached sessions.
   /// Maximum number of sessions and handshakes per client address.
   int max_sessions_per_address = 256;
-  /// Longest time from accepting a connection to a complete Hello.
+  /// Maximum time from accepting a connection to a complete Hello.
   double handshake_timeout_s = 5.0;
-  double idle_timeout_s = 30.0;   ///< Longest time without received bytes; 0: no timeout.
-  double write_timeout_s = 30.0;  ///< Longest time without progress of a pending write.
+  double idle_timeout_s = 30.0;   ///< Maximum time without received bytes; 0: no timeout.
+  double write_timeout_s = 30.0;  ///< Maximum time without progress of a pending write.
   /// Time for which a detached session waits for its client; 0: sessions cannot be resumed.
   double resume_window_s = 60.0;
 
@@ -39,12 +39,16 @@ struct Limits {
   int max_queue = 256;  ///< Waiting requests per avatar.
 
   // Commands of one session.
-  int requests_per_s = 50'000;     ///< Command items per second; more are rejected.
-  int request_burst = 65'536;      ///< Command items that a session may send at once.
-  int starts_per_tick = 128;       ///< Avatars that one command starts per tick, on all shards.
-  int spawns_per_tick = 512;       ///< Avatars that one shard spawns per tick, for all sessions.
-  int messages_per_s = 4000;       ///< Messages of any kind; the server pauses reading beyond it.
-  int max_pending_commands = 256;  ///< Unanswered commands; the server pauses reading beyond it.
+  int requests_per_s = 50'000;  ///< Command items per second; more are rejected.
+  int request_burst = 65'536;   ///< Command items that a session may send at once.
+  /// Maximum number of avatars that one command starts per tick, on all shards.
+  int starts_per_tick = 128;
+  /// Maximum number of avatars that one shard spawns per tick, for all sessions.
+  int spawns_per_tick = 512;
+  /// Messages of any type. If there are more, the server pauses reading.
+  int messages_per_s = 4000;
+  /// Unanswered commands. If there are more, the server pauses reading.
+  int max_pending_commands = 256;
 
   // Memory of one session.
   /// Outgoing messages except poses and movements. Movements have a second budget of this size.

@@ -56,9 +56,10 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
 
   void SendControl(SharedFrame frame);
   [[nodiscard]] bool SendEvents(SharedFrame frame);
-  /// Returns how many waiting frames of older batches were dropped because the peer is slow.
+  /// Sends a batch. Returns how many waiting frames of older batches were dropped because the peer
+  /// is slow.
   [[nodiscard]] std::size_t SendPoses(PoseFrames&& batch);
-  /// Result as for SendQueue::PushMovements.
+  /// Sends movements. The result is that of SendQueue::PushMovements.
   [[nodiscard]] std::size_t SendMovements(WorldId world, int shard, SharedFrame frame);
   void DropMovements(WorldId world) { queue_.DropMovements(world); }
   void SendTerrain(WorldId world, SharedFrame frame);
@@ -72,17 +73,17 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   void PauseReading() { is_paused_ = true; }
   void ResumeReading();
 
-  /// Drops waiting poses, sends all other waiting frames and the end of the stream, and closes when
-  /// the peer has closed, at the latest after kLinger. Waiting ensures that the last message
-  /// arrives: closing a socket with unread bytes would discard it. The handler is not called any
-  /// more. A WebSocket sends `code`, unless a bad frame has set another code.
+  /// Drops waiting poses, sends all other waiting frames and the end of the stream, and closes the
+  /// connection when the peer has closed it, at the latest after kLinger. Waiting ensures that the
+  /// last message arrives, because closing a socket with unread bytes would discard it. The handler
+  /// is not called any more. A WebSocket sends `code`, unless a bad frame has set another code.
   void CloseGently(CloseCode code = CloseCode::kNormal);
   /// Closes at once.
   void Close();
   [[nodiscard]] bool is_closed() const { return is_closed_; }
 
-  /// Returns the detached transport and closes this connection. `received` gets the bytes after the
-  /// last message. May be called only from OnMessage, if nothing was sent before.
+  /// Returns the detached transport and closes this connection. Writes the bytes after the last
+  /// message to `received`. May be called only from OnMessage, if nothing was sent before.
   [[nodiscard]] std::unique_ptr<Transport> Release(std::vector<std::byte>& received);
 
  private:

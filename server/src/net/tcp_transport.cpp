@@ -11,8 +11,8 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-// A buffer sequence that borrows its buffers. Asio copies the sequence that it is given; copying a
-// vector would allocate memory for every write.
+// A buffer sequence that borrows its buffers. Asio copies buffer sequences, and copying a vector
+// would allocate memory for every write.
 struct BufferList {
   // These names are required by Asio.
   using value_type = asio::const_buffer;             // NOLINT(readability-identifier-naming)

@@ -84,7 +84,7 @@ class Transport {
   virtual ~Transport() = default;
 
   [[nodiscard]] virtual TransportKind kind() const = 0;
-  /// True if the transport has message boundaries; each message must contain one frame.
+  /// True if the transport has message boundaries. Each message must then contain one frame.
   [[nodiscard]] bool has_messages() const { return kind() == TransportKind::kWebSocket; }
   [[nodiscard]] virtual boost::asio::any_io_executor executor() = 0;
 

@@ -154,7 +154,7 @@ void Handshakes::OnHello(Handshake& handshake, const protocol::Hello& hello) {
 void Handshakes::Remove(Handshake& handshake) {
   const auto it = handshakes_.find(&handshake);
   if (it == handshakes_.end()) return;
-  // The handshake or its connection may be calling this function, so post their destruction.
+  // The handshake or its connection may be calling this function, so their destruction is posted.
   const std::shared_ptr<Handshake> removed = std::move(it->second);
   handshakes_.erase(it);
   const auto count = address_counts_.find(removed->address());

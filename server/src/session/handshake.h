@@ -13,14 +13,14 @@
 
 namespace stridewire::server {
 
-/// Receives Hello on new connections, finds or creates the session, and hands the transport to the
+/// Receives Hello on new connections, finds or creates the session, and passes the transport to the
 /// shard of the session. It runs on the main thread, so that a flood of connections does not delay
 /// the ticks of shards. Not thread-safe.
 class Handshakes {
  public:
   using Adopt = std::function<void(int shard, Arrival arrival)>;
 
-  /// Borrows all references. `adopt` hands an arrival to its shard.
+  /// Borrows all references. `adopt` passes an arrival to its shard.
   Handshakes(boost::asio::io_context& context, const Limits& limits, ThreadMetrics& metrics,
              SessionDirectory& directory, Adopt adopt);
   ~Handshakes();

@@ -25,10 +25,12 @@ void MovementFeed::SetAvatars(std::optional<std::vector<AvatarId>> avatars) {
   std::ranges::set_difference(selected_, *avatars, std::back_inserter(removed));
   std::vector<AvatarId> all_removed;
   std::ranges::set_union(deselected_, removed, std::back_inserter(all_removed));
-  // An avatar that is selected again before it was reported as gone stays valid for the client.
+  // If an avatar is selected again before it was reported as gone, its state on the client remains
+  // valid.
   deselected_.clear();
   std::ranges::set_difference(all_removed, *avatars, std::back_inserter(deselected_));
-  // States are missing for new avatars, and for those that are still selected and not sent yet.
+  // States are missing for new avatars, and for avatars that are still selected and whose states
+  // have not been sent.
   std::vector<AvatarId> missing;
   if (next_ != 0 && states_of_ != nullptr) {
     std::ranges::copy_if(*states_of_, std::back_inserter(missing), [&](AvatarId id) {

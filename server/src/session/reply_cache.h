@@ -16,8 +16,8 @@ namespace stridewire::server {
 ///
 ///   forgotten <- first_seq ... answered or pending ... last_seq -> new
 ///
-/// At most `max_count` commands and `max_bytes` of replies are stored; older replies are forgotten.
-/// The last reply and unanswered commands are never forgotten.
+/// At most `max_count` commands and `max_bytes` of replies are stored. Older replies are discarded
+/// ("forgotten"). The last reply and unanswered commands are never discarded.
 class ReplyCache {
  public:
   enum class Verdict : std::uint8_t {
@@ -40,8 +40,8 @@ class ReplyCache {
   /// Accepts a command that is kNew. It becomes kPending.
   void Begin(protocol::Seq seq);
 
-  /// Stores the reply to a command that is kPending. It becomes kAnswered. Returns how many older
-  /// replies were forgotten to make room.
+  /// Stores the reply to a command that is kPending. The command becomes kAnswered. Returns how
+  /// many older replies were discarded.
   std::size_t Store(protocol::Seq seq, SharedFrame reply, WorldId joined);
 
   /// Returns the reply to a command that is kAnswered.

@@ -166,8 +166,8 @@ void Session::Housekeep(Clock::time_point now) {
     return;
   }
   for (auto& [id, membership] : context_.worlds) {
-    // Repeats one reply at a time, so that replies do not accumulate for a client that does not
-    // read.
+    // Repeats one reply at a time, so that replies do not accumulate if the client does not read
+    // them.
     if (context_.connection->queue().control_empty()) stream_.SendLagging(membership);
   }
   UpdatePause();
@@ -181,7 +181,8 @@ void Session::UpdatePause() {
       commands_.pending_count() >= static_cast<std::size_t>(limits.max_pending_commands) ||
       commands_.pending_items() > protocol::kMaxItems;
   const bool exceeds_rate = message_tokens_.tokens() < 1.0;
-  // Replies cannot be dropped, so the session reads no commands until the client has read some.
+  // Replies cannot be dropped, so the session does not read commands until the client has read some
+  // replies.
   const bool is_queue_full =
       context_.connection->queue().control_bytes() > limits.control_buffer_bytes / 2;
   if (is_pending_full || exceeds_rate || is_queue_full) {

@@ -351,7 +351,7 @@ void SessionCommands::Execute(protocol::Spawn&& command) {
 void SessionCommands::Execute(protocol::Request&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
-  // Count avatars; all requests of an avatar are usually in a row.
+  // Counts the avatars. All requests of an avatar are usually in a row.
   std::size_t avatars = 0;
   for (std::size_t i = 0; i < command.items.size(); ++i) {
     avatars += i == 0 || command.items[i].avatar != command.items[i - 1].avatar;

@@ -29,7 +29,7 @@ class SessionHost {
   [[nodiscard]] virtual protocol::Encoder& encoder() = 0;
   [[nodiscard]] virtual protocol::PoseBatchComposer& composer() = 0;
 
-  /// Sends a message to a shard, which may be the own one. The results are passed to
+  /// Sends a message to a shard, which may be this session's own shard. The results are passed to
   /// Session::OnResult (WorldCommand), OnInspected (InspectRequest) or OnStates (StatesRequest).
   virtual void SendToShard(int shard, ShardMessage message) = 0;
   /// Sends a message to the main thread. The result of a JoinRequest is passed to

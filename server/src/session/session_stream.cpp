@@ -208,7 +208,8 @@ std::uint64_t SessionStream::SendEvents(protocol::Events&& message) {
   const SharedFrame frame = EncodeFrame(context_.host.encoder(), message);
   if (frame == nullptr) return 0;
   const bool was_sent = context_.connection != nullptr && context_.connection->SendEvents(frame);
-  // If the send queue is full, the message is dropped. Sent later, it would be out of order.
+  // If the send queue is full, the message is dropped, because it would be out of order if it were
+  // sent later.
   if (context_.connection != nullptr && !was_sent) return message.events.size();
   event_replay_.Add({message.number, message.events.size(), was_sent, frame});
   const std::uint64_t dropped = event_replay_.TakeDropped();

@@ -67,8 +67,8 @@ class Subscriptions {
     return channels_.contains({world, mode});
   }
   [[nodiscard]] SendInterval IntervalOf(WorldId world, protocol::PoseMode mode) const;
-  /// Returns the ascending ids of the selected avatars. Empty if complete batches are needed, or if
-  /// no poses are needed.
+  /// Returns the ascending ids of the selected avatars. Returns an empty list if complete batches
+  /// are needed, or if no poses are needed.
   [[nodiscard]] std::span<const AvatarId> SelectedAvatars(WorldId world,
                                                           protocol::PoseMode mode) const;
   /// Returns the rings of this mode of the region of this world, or nullopt if there are none.

@@ -15,13 +15,14 @@ namespace stridewire::server {
 [[nodiscard]] protocol::Placement ToWire(const BaseFrame& base);
 [[nodiscard]] BaseFrame FromWire(const protocol::Placement& placement);
 [[nodiscard]] MovementRequest FromWire(const protocol::RequestItem& item);
-/// The caller sets `avatar`.
+/// `avatar` is not set; the caller must set it.
 [[nodiscard]] protocol::RequestItem ToWire(const MovementRequest& request);
 
 [[nodiscard]] protocol::TerrainInfo ToWire(const TerrainData& terrain);
 [[nodiscard]] TerrainData FromWire(protocol::TerrainInfo&& terrain);
 
-/// The caller sets `avatar`, `tick` and `time_s`, which the runtime's event does not contain.
+/// `avatar`, `tick` and `time_s` are not set, because the runtime's event does not contain them.
+/// The caller must set them.
 [[nodiscard]] protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library);
 
 /// Returns the status code that clients receive for an error of the runtime.

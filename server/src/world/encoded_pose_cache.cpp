@@ -202,9 +202,9 @@ void EncodedPoseCache::FinishStep() {
                                 static_cast<int>(max_count));
     poses += static_cast<std::size_t>(item.count);
   }
-  // A whole crowd may need poses at once, because a client starts to observe it or because it was
-  // interrupted. Then slots outside their phase get only one pose, so that a tick evaluates hardly
-  // more than two poses per avatar.
+  // Poses of a whole crowd may be needed at once, because a client starts to observe it or because
+  // it was interrupted. In this case, slots outside their phase get only one pose, so that a tick
+  // evaluates hardly more than two poses per avatar.
   const bool is_crowd_new = poses > 2 * avatar_count_ + kLanes * kMaxTicksAhead;
   for (Scheduled& item : scheduled_) {
     const SlotState& state = slots_[item.slot];
@@ -292,7 +292,7 @@ EncodedPoseCache::Encoded EncodedPoseCache::FindOverflow(std::uint32_t slot, std
   if ((flags >> mode & 1u) == 0) {
     return {{BytesOf(slot, pose) + modes_[mode].offset, modes_[mode].codec->pose_bytes()}};
   }
-  // Skip the uncompressed poses that were stored before this one: those of earlier poses, then
+  // Skips the uncompressed poses that were stored before this one: those of earlier poses, then
   // those of earlier modes.
   constexpr unsigned kUncompressed = (1u << kMaxModes) - 1;
   auto before = static_cast<std::size_t>(std::popcount(flags & kUncompressed & ((1u << mode) - 1)));

@@ -127,7 +127,7 @@ class EncodedPoseCache {
   /// If either changes, all slots become empty. Do not call it between BeginStep and FinishStep.
   void SetModes(std::span<const protocol::PoseMode> compact_modes, int steps_apart);
 
-  /// Selects the step whose poses the following calls concern. `step_s` is the length of a step,
+  /// Starts a step, to which the following calls apply. `step_s` is the length of a step,
   /// `avatar_count` the number of avatars whose poses are used in this step.
   void BeginStep(std::uint64_t step, double step_s, std::size_t avatar_count);
 
@@ -135,7 +135,7 @@ class EncodedPoseCache {
   /// until then.
   void Request(Slot& slot, AvatarSimulation& avatar);
 
-  // Request consists of the following three functions.
+  // The following three functions are the parts of Request.
 
   /// True if the slot contains the pose of this step.
   [[nodiscard]] bool Contains(const Slot& slot, std::uint64_t revision) const {
@@ -188,7 +188,7 @@ class EncodedPoseCache {
   // State of one slot; read in every tick.
   struct SlotState {
     enum Kind : std::uint8_t { kEmpty, kScheduled, kTimed, kConstant };
-    std::uint64_t first_step = 0;  // Step of the first pose if the state is timed.
+    std::uint64_t first_step = 0;  // In state kTimed: step of the first pose.
     std::uint32_t revision = 0;    // Low bits of the avatar's revision.
     std::uint8_t count = 0;        // Number of poses: 0 if empty or scheduled, 1 if constant.
     std::uint8_t first_plane = 0;

@@ -8,7 +8,7 @@
 namespace stridewire::server {
 
 /// Describes an avatar for InspectAvatar: its base frame, its movement and its queue. The caller
-/// fills in nonce, world, avatar id, tick and times, and adds the avatar's offset to
+/// must set nonce, world, avatar id, tick and times, and add the avatar's offset to
 /// `movement->started_s`, which is in avatar time. Parameters of examples are omitted if they take
 /// more than `max_site_bytes`.
 [[nodiscard]] protocol::AvatarState Inspect(const AvatarSimulation& avatar,

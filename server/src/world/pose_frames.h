@@ -14,7 +14,7 @@
 namespace stridewire::server {
 
 /// Composes a pose batch of the rows `picked`, which are ascending indices. Returns one frame, or
-/// several if the batch exceeds the frame limit; an empty batch is one frame. With a frame limit
+/// several if the batch exceeds the frame limit. An empty batch is one frame. If the frame limit is
 /// far below the default, some poses may not fit into the maximum number of frames. They are
 /// omitted and counted in `metrics`. `is_partial`: see protocol::PoseBatchInfo.
 [[nodiscard]] std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
@@ -22,12 +22,12 @@ namespace stridewire::server {
                                                      std::span<const std::uint32_t> picked,
                                                      bool is_partial, ThreadMetrics& metrics);
 
-/// Reuses the memory of PoseRows that other threads read. One thread takes and shares rows.
+/// Reuses the memory of PoseRows that other threads read. One thread calls Take and Share.
 class RowsPool {
  public:
   /// Returns rows to fill. They belong to the caller until the next call.
   [[nodiscard]] protocol::PoseRows& Take();
-  /// Returns the rows of the last Take as read-only. When the last reader has released them, Take
+  /// Returns the rows of the last Take as read-only. After the last reader has released them, Take
   /// reuses them.
   [[nodiscard]] std::shared_ptr<const protocol::PoseRows> Share();
 

@@ -97,7 +97,7 @@ struct CommandResult {
   std::vector<protocol::ReplyItem> items;
 };
 
-/// Asks for the state of one avatar after the next tick (protocol message InspectAvatar).
+/// Requests the state of one avatar after the next tick (protocol message InspectAvatar).
 struct InspectRequest {
   std::shared_ptr<World> world;
   int from_shard = 0;  ///< The shard of the session.
@@ -110,8 +110,8 @@ struct InspectResult {
   protocol::AvatarState state;
 };
 
-/// Asks for the states of avatars after the next tick, for a client that will receive their
-/// movements. A shard answers with as many states as fit; the session then asks for the rest.
+/// Requests the states of avatars after the next tick, for a client that will receive their
+/// movements. A shard answers with as many states as fit. The session then requests the rest.
 struct StatesRequest {
   std::shared_ptr<World> world;
   int from_shard = 0;  ///< The shard of the session.
@@ -140,7 +140,7 @@ inline constexpr std::array kSentModes{
   return static_cast<std::size_t>(mode) - (mode > protocol::PoseMode::kMovement ? 1 : 0);
 }
 
-/// A disc or ring on the ground. The avatars inside are of interest in one mode.
+/// A disc or ring on the ground, in which sessions need the poses of all avatars in one mode.
 struct RegionFilter {
   double x = 0.0;
   double z = 0.0;
@@ -226,7 +226,7 @@ struct ShardOutbox {
   std::vector<StatesResult> states;  ///< Delivered after the movements of the same tick.
 };
 
-/// Asks the main thread for a world, which it creates if necessary.
+/// Requests a world from the main thread, which creates it if necessary.
 struct JoinRequest {
   int from_shard = 0;
   SessionId session = 0;
@@ -243,8 +243,8 @@ struct LeaveNotice {
   WorldId world = 0;
 };
 
-/// Asks the main thread to validate and encode a terrain. On success, it sends a TerrainPart to all
-/// shards; otherwise it sends a TerrainRefusal to `from_shard`.
+/// Requests that the main thread validates and encodes a terrain. On success, it sends a
+/// TerrainPart to all shards. Otherwise, it sends a TerrainRefusal to `from_shard`.
 struct TerrainChange {
   std::shared_ptr<World> world;
   int from_shard = 0;

@@ -7,7 +7,8 @@
 namespace stridewire::server {
 
 /// Positions of the avatars of one tick on the ground, sorted into the cells of a grid. Finds the
-/// avatars near a point without visiting all of them. One thread fills it; then any thread reads.
+/// avatars near a point without visiting all of them. One thread fills it. Any thread may then read
+/// it.
 class SpatialGrid {
  public:
   /// Clears the grid. `cell_m` must be positive; `count` is the expected number of avatars.
@@ -24,7 +25,7 @@ class SpatialGrid {
     const std::int64_t last_x = CellOf(x + reach_m);
     const std::int64_t first_z = CellOf(z - reach_m);
     const std::int64_t last_z = CellOf(z + reach_m);
-    // If the area has more columns than there are avatars, visit all avatars instead of columns.
+    // If the area has more columns than there are avatars, it is faster to visit all avatars.
     const bool is_vast = last_x - first_x >= static_cast<std::int64_t>(entries_.size());
     for (std::int64_t column = first_x; column <= (is_vast ? first_x : last_x); ++column) {
       const std::size_t end = is_vast ? entries_.size() : LowerBound(column, last_z + 1);

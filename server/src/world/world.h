@@ -42,9 +42,9 @@ struct World {
   return static_cast<int>(avatar % static_cast<AvatarId>(shard_count));
 }
 
-/// Spreads the starts of a large command over several ticks. Returns the tick offset of an avatar,
-/// less than `over_ticks`. It depends only on the avatar's id, not on the other avatars of the
-/// command, their order or the number of shards.
+/// Distributes the starts of a large command over several ticks. Returns the tick offset of an
+/// avatar, less than `over_ticks`. It depends only on the avatar's id, not on the other avatars of
+/// the command, their order or the number of shards.
 [[nodiscard]] constexpr std::uint32_t StartTickOf(AvatarId avatar, std::uint32_t over_ticks) {
   // The finalizer of MurmurHash3 spreads consecutive ids evenly, even if `over_ticks` and the
   // number of shards have common factors.

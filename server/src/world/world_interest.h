@@ -12,7 +12,7 @@ class WorldInterest {
  public:
   explicit WorldInterest(int shard_count) : interests_(static_cast<std::size_t>(shard_count)) {}
 
-  /// Replaces the interest of shard `interest.shard`.
+  /// Sets the interest of shard `interest.shard`, which replaces its previous one.
   void Set(const Interest& interest);
 
   /// Poses that a shard must send in a given tick.
@@ -38,7 +38,7 @@ class WorldInterest {
   [[nodiscard]] bool HasMixedRegions(protocol::PoseMode mode) const;
   /// Returns the observed compact modes, in the order of kSentModes.
   [[nodiscard]] std::vector<protocol::PoseMode> CompactModes() const;
-  /// Returns the largest interval in ticks that is needed to serve every session, at least 1.
+  /// Returns the greatest common divisor of the intervals of all sessions, in ticks; at least 1.
   [[nodiscard]] int CommonInterval() const;
   /// Returns the longest interval of any session in ticks, at least 1.
   [[nodiscard]] std::uint16_t max_interval() const { return max_interval_; }

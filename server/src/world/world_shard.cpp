@@ -25,8 +25,8 @@ bool IsSpawnable(const protocol::Placement& start) {
          std::abs(start.heading_rad) <= kMaxSpawnHeadingRad;
 }
 
-// Number of dropped requests that are reported per tick. One command can drop millions, whose
-// events would take gigabytes at once.
+// Maximum number of dropped requests that are reported per tick. One command can drop millions,
+// whose events would take gigabytes at once.
 constexpr std::size_t kMaxDroppedPerTick = 16384;
 
 ReplyItem NoSuchAvatar(std::uint32_t index, AvatarId avatar, protocol::RequestId request = 0) {
@@ -376,8 +376,8 @@ void WorldShard::SetInterest(const Interest& interest) {
   are_selected_rows_valid_ = false;
   cache_.SetModes(interest_.CompactModes(), interest_.CommonInterval());
   for (std::size_t mode = 0; mode < kSentModes.size(); ++mode) {
-    // A session may select avatars that do not exist (any more). It needs one delivery without
-    // poses to learn this.
+    // A session may select avatars that do not exist (any more). It recognizes this by one delivery
+    // without poses.
     last_had_poses_[mode] = interest_.IsObserved(kSentModes[mode]) &&
                             (last_had_poses_[mode] || interest.poses[mode].interval.subset > 0);
   }

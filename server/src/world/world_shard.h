@@ -121,7 +121,7 @@ class WorldShard {
   void Release(SessionId session, std::uint64_t tick);
   void ApplyTerrain(std::uint64_t tick);
   void AdvanceAvatars(std::uint64_t tick, int steps);
-  // All avatars in the order of their ids.
+  // Returns all avatars in the order of their ids.
   std::span<const OrderedAvatar> OrderedAvatars();
   void RecordMovements();
   void RecordRemoval(AvatarId avatar);

@@ -23,7 +23,7 @@ struct WorldTerrain {
 [[nodiscard]] Expected<std::shared_ptr<const WorldTerrain>> MakeWorldTerrain(
     protocol::WorldId world, std::shared_ptr<const Terrain> terrain, protocol::Encoder& encoder);
 
-/// The current terrain of a world, for all threads. Its lock is used when the terrain is set or a
+/// The current terrain of a world, for all threads. It is locked only when the terrain is set or a
 /// client joins, never in a tick.
 class TerrainSlot {
  public:

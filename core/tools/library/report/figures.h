@@ -13,8 +13,8 @@
 
 namespace stridewire {
 
-// A figure that is not drawn yet: a gnuplot script with its data. The same input gives the same
-// text.
+// A figure that has not been drawn yet: a gnuplot script with its data. The same input gives the
+// same text.
 struct Figure {
   std::string file;  // Name of the SVG file.
   std::string caption;

@@ -11,7 +11,7 @@
 namespace stridewire {
 namespace {
 
-// Estimated share of the work that is finished after refinement and after planning the figures.
+// Estimated fractions of the work that are done after refinement, and after planning the figures.
 constexpr double kRefined = 0.6;
 constexpr double kPlanned = 0.7;
 
@@ -26,7 +26,7 @@ std::string ParameterList(const MotionGroup& group) {
   return text;
 }
 
-// Lists the groups, and the errors of their movements.
+// Returns tables of the groups and of the errors of their movements.
 std::string GroupTables(const Report& report) {
   HtmlTable rows = {{"Group", "Kind", "Examples", "Parameters"}};
   HtmlTable errors = {{"Group", "Kind", "Uncorrected, mm", "Mean, mm", "Corrected, mm",
@@ -106,8 +106,8 @@ bool IsMirrored(const MotionGroup& group) {
                      [](std::uint8_t mirrored) { return mirrored != 0; });
 }
 
-// Returns false if a map would be empty: for a single example, or a slice that hardly meets the
-// hull.
+// Returns false if a map would be empty, because there is a single example or because the slice
+// hardly intersects the hull.
 bool IsMap(const ErrorMap& map) {
   const auto spans = [](const std::vector<double>& axis) {
     return axis.size() == 1 || axis.back() - axis.front() > 1e-6;
@@ -117,7 +117,7 @@ bool IsMap(const ErrorMap& map) {
   return spans(map.x) && spans(map.y) && inside > 8;
 }
 
-// A section with figures that are not drawn yet.
+// A section with figures that have not been drawn yet.
 struct Part {
   std::string id;
   std::string heading;
@@ -201,7 +201,7 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
       if (!before) return std::unexpected(before.error());
       const auto after = MeasureErrorMap(*report.refinement.library, g, MapOptions(axes));
       if (!after) return std::unexpected(after.error());
-      // The grid of the map may hit a narrow peak that the samples missed.
+      // A point of the map may be on a narrow peak that the samples missed.
       GroupRefinement& refined = report.refinement.groups[index];
       refined.before.max_error_m = std::max(refined.before.max_error_m, before->max_error_m);
       refined.after.max_error_m = std::max(refined.after.max_error_m, after->max_error_m);

@@ -22,7 +22,7 @@ struct ReportOptions {
   int max_pseudoexamples = 16;
   // All usable movements of some captures without averaging, to measure realism. May be null.
   std::shared_ptr<const MotionLibrary> captured;
-  // Called repeatedly with the finished share of the work, in [0, 1]. Returns false to stop.
+  // Called repeatedly with the fraction of the work that is done, in [0, 1]. Return false to stop.
   std::function<bool(double)> progress;
 };
 
