@@ -12,12 +12,14 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
+#include "instruction_sets.h"
 #include "offline/build/layers.h"
 #include "offline/build/library_writer.h"
 #include "offline/build/refine.h"
 #include "offline/builtin/builtin_library.h"
 #include "random.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/apply_layer.h"
 #include "runtime/skeleton/layer_clip.h"
 #include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/synthesis.h"
@@ -143,6 +145,44 @@ TEST_P(Layers, PlayTheClipAndKeepTheBitsOfLegsAndRoot) {
   ASSERT_GT(ticks, 300);
   EXPECT_GT(differing, 1000u);
   EXPECT_TRUE(SameBits(plain.base().position_m, layered.base().position_m));
+}
+
+// At the time of a key, the blend has the exact formula of decision 0012.
+TEST(LayerBlends, FollowTheFormulaWithTheSameBytesOnEveryInstructionSet) {
+  constexpr unsigned kSeed = 19;
+  std::printf("seed %u\n", kSeed);
+  Random random(kSeed);
+  const Library library = LibraryOf({});
+  const std::vector<std::int64_t> sets = InstructionSets();
+  for (const LayerClip& clip : library->layers()) {
+    for (int round = 0; round < 200; ++round) {
+      Pose before(library->skeleton().joint_count());
+      for (Quat& q : before.rotations) {
+        q = Normalise(Quat(random.Draw(-1.0, 1.0), random.Draw(-1.0, 1.0), random.Draw(-1.0, 1.0),
+                           random.Draw(-1.0, 1.0)));
+      }
+      const int key = round % clip.frame_count();
+      const double weight = round % 10 == 0 ? 1.0 : random.Draw(0.0, 1.0);
+      std::vector<Pose> after(sets.size(), before);
+      for (std::size_t s = 0; s < sets.size(); ++s) {
+        const OnlyInstructionSet only(sets[s]);
+        ApplyLayer(clip, key / clip.fps, weight, after[s]);
+        for (std::size_t j = 0; j < before.rotations.size(); ++j) {
+          ASSERT_TRUE(SameBits(after[s].rotations[j], after[0].rotations[j])) << "joint " << j;
+        }
+      }
+      for (std::size_t i = 0; i < clip.joints.size(); ++i) {
+        const std::size_t at = (static_cast<std::size_t>(key) * clip.joints.size() + i) * 4;
+        const auto q = clip.rotations.subspan(at, 4);
+        const auto j = static_cast<std::size_t>(clip.joints[i]);
+        const Quat& from = before.rotations[j];
+        const Quat expected =
+            from * SlerpFromIdentity(glm::conjugate(from) * Quat(q[3], q[0], q[1], q[2]),
+                                     static_cast<float>(weight) * clip.weights[i]);
+        ASSERT_LE(AngleBetween(expected, after[0].rotations[j]), 2e-6) << "joint " << j;
+      }
+    }
+  }
 }
 
 TEST(LayerWeights, HaveContinuousSlopeUnderInterruptions) {

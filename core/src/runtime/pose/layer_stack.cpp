@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "base/easing.h"
+#include "runtime/pose/apply_layer.h"
 #include "runtime/skeleton/layer_clip.h"
 #include "stridewire/runtime/motion_library.h"
 

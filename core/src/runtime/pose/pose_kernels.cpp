@@ -170,6 +170,39 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   return !Any(is_short);
 }
 
+// q and -q are the same rotation. Returns the one that is closer to `reference`.
+HWY_INLINE SoaQuat Closer(SoaQuat q, SoaQuat reference) {
+  return q * Select(Dot(q, reference) < Float(0.0f), Float(-1.0f), Float(1.0f));
+}
+
+void BlendLayer(const LayerBlend& layer, float* rotations) {
+  const std::size_t width = hn::Lanes(FloatTag());
+  for (std::size_t i = 0; i < layer.joint_count; i += width) {
+    const std::size_t left = layer.joint_count - i;
+    const std::size_t lanes = left < width ? left : width;
+    float weights[kBlock] = {};
+    std::memcpy(weights, layer.joint_weights + i, lanes * sizeof(float));
+    const auto key = [&](std::size_t k) HWY_ATTR { return LoadQuats(layer.keys[k] + 4 * i, left); };
+    const SoaQuat second = key(1);
+    const SoaQuat third = Closer(key(2), second);
+    const SoaQuat played =
+        Normalise(Closer(key(0), second) * Float(layer.key_weights[0]) +
+                  second * Float(layer.key_weights[1]) + third * Float(layer.key_weights[2]) +
+                  Closer(key(3), third) * Float(layer.key_weights[3]));
+    // Lanes beyond the last joint repeat it and are not stored.
+    const auto rotation_of = [&](std::size_t lane) HWY_ATTR {
+      const std::size_t joint = i + lane < layer.joint_count ? i + lane : layer.joint_count - 1;
+      return rotations + 4 * static_cast<std::size_t>(layer.joints[joint]);
+    };
+    const SoaQuat from = GatherQuats(rotation_of);
+    const Float share = LoadLanes(weights) * Float(layer.weight);
+    const SoaQuat towards = SlerpOf(SlerpPartsOf(Multiply(Conjugate(from), played)), share);
+    const SoaQuat blended =
+        Select(share >= Float(1.0f), played, Normalise(Multiply(from, towards)));
+    ScatterQuats(blended, lanes, rotation_of);
+  }
+}
+
 void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
@@ -276,6 +309,7 @@ HWY_EXPORT(SumRows);
 HWY_EXPORT(BlendPoints);
 HWY_EXPORT(BlendRows);
 HWY_EXPORT(BlendRotations);
+HWY_EXPORT(BlendLayer);
 HWY_EXPORT(ComputeGridSamples);
 HWY_EXPORT(SinCos);
 HWY_EXPORT(Transpose);
@@ -300,6 +334,10 @@ void BlendRows(const BlendRowsJob& run) { HWY_DYNAMIC_DISPATCH(BlendRows)(run); 
 
 bool BlendRotations(const RotationBlend& blend, float* out) {
   return HWY_DYNAMIC_DISPATCH(BlendRotations)(blend, out);
+}
+
+void BlendLayer(const LayerBlend& layer, float* rotations) {
+  HWY_DYNAMIC_DISPATCH(BlendLayer)(layer, rotations);
 }
 
 void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples) {

@@ -95,6 +95,19 @@ struct RotationBlend {
 /// A sum of rotations that is shorter than this has no usable direction.
 inline constexpr float kSmallestNorm = 0.1f;
 
+/// A layer that is blended over the rotations of some joints of a pose.
+struct LayerBlend {
+  const float* keys[4];        ///< [joint_count] x y z w: the keys around the current time
+  const float* key_weights;    ///< [4]: their weights, with sum 1
+  const int* joints;           ///< [joint_count]: joints of the pose that the layer moves
+  const float* joint_weights;  ///< [joint_count]: weights of these joints, in (0, 1]
+  std::size_t joint_count;
+  float weight;  ///< Weight of the layer, in [0, 1]
+};
+/// Changes the rotation r of each of the layer's joints, rotations[joint] x y z w,
+/// to r slerp(1, r^-1 c, weight * joint weight), where c is the weighted mean of the keys.
+void BlendLayer(const LayerBlend& layer, float* rotations);
+
 /// Computes sine and cosine of `count` angles with |x| <= 1e5. The results have the same bits as
 /// Sin and Cos of base/trig.h.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);

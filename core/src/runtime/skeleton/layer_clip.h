@@ -5,8 +5,6 @@
 #include <string_view>
 #include <vector>
 
-#include "stridewire/base/math.h"
-#include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
 
 namespace stridewire {
@@ -49,11 +47,5 @@ struct LayerClip {
 /// [joint]: true for joints that layers must not affect: the root, all joints between the root and
 /// the balls of the feet, and all joints below a hip.
 [[nodiscard]] std::vector<bool> JointsOfLegs(const Skeleton& skeleton);
-
-/// Rotates the joints of `pose` towards the clip at `time_s`: r slerp(1, r^-1 c, weight * mask),
-/// along the short arc. The clip is C1 between its keys (Catmull-Rom). The time wraps around in a
-/// loop and is clamped in other clips. `weight` is in [0, 1]. Never allocates. Joints outside the
-/// mask do not change.
-void ApplyLayer(const LayerClip& clip, double time_s, double weight, PoseSpan pose);
 
 }  // namespace stridewire
