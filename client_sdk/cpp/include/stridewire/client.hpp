@@ -9,8 +9,8 @@
 
 #include "stridewire/client.h"
 
-/// C++17 wrapper of `stridewire/client.h`. It owns the handle and resizes buffers; the C header
-/// documents each function. Only std::bad_alloc is ever thrown.
+/// C++17 wrapper of `stridewire/client.h`. It owns the handle and resizes buffers. The C header
+/// documents each function. The only exception that it throws is std::bad_alloc.
 namespace stridewire::client {
 
 /// Result of a call. Converts to true if the call succeeded.
@@ -71,19 +71,18 @@ inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id
   m.heading_rad = heading_rad.value_or(0.0);
   return m;
 }
-/// Changes a step request such that the server rejects it unless the foot lands exactly at its
-/// place.
+/// Changes a step request so that the server rejects it unless the foot lands exactly at its place.
 inline stridewire_movement ExactOnly(stridewire_movement step) {
   step.exact_only = 1;
   return step;
 }
-/// Changes a request for a step or jump such that the server plays the nearest movement of its
-/// library, however far that is from the request.
+/// Changes a request for a step or jump so that the server plays the nearest movement of its
+/// library, however far it is from the request.
 inline stridewire_movement AllowNearest(stridewire_movement movement) {
   movement.allow_nearest = 1;
   return movement;
 }
-/// Changes a request such that it interrupts the current movement and drops the queue.
+/// Changes a request so that it interrupts the current movement and drops the queue.
 inline stridewire_movement Now(stridewire_movement movement) {
   movement.interrupt = STRIDEWIRE_NOW;
   return movement;
@@ -168,8 +167,8 @@ struct Terrain : stridewire_terrain {
 /// without a comment have the behaviour of the C function with the same name.
 class Client {
  public:
-  /// Creates a client that is not connected. On failure it returns an empty optional and stores the
-  /// reason in `status` unless that is null.
+  /// Creates a client that is not connected. On failure, returns nullopt and stores the reason in
+  /// `status`, unless that is null.
   static std::optional<Client> Create(const stridewire_client_options& options = Options(),
                                       stridewire_status* status = nullptr) {
     stridewire_client* handle = nullptr;
@@ -185,7 +184,7 @@ class Client {
     return *this;
   }
 
-  /// Returns the handle, for C functions that have no method here. This object keeps the ownership.
+  /// Returns the handle, for C functions without a method here. This object keeps the ownership.
   stridewire_client* get() const { return handle_; }
 
   Result Connect(const std::string& host, std::uint16_t port) {
@@ -320,7 +319,8 @@ class Client {
       if (status == STRIDEWIRE_OK) return status;
     }
   }
-  /// Returns the names of the layers in a world's library. Empty before the event WORLD_JOINED.
+  /// Returns the names of the layers in a world's library. Returns an empty list before the event
+  /// WORLD_JOINED.
   std::vector<std::string> ListLayers(stridewire_world world) const {
     std::vector<stridewire_layer_name> names;
     std::size_t count = 0;
@@ -347,7 +347,7 @@ class Client {
       if (status == STRIDEWIRE_OK) return status;
     }
   }
-  /// Returns the ids of the avatars whose poses arrive, in ascending order.
+  /// Returns the ids of the avatars whose poses the client receives, in ascending order.
   std::vector<std::uint32_t> ListAvatars(stridewire_world world) const {
     std::vector<std::uint32_t> avatars;
     std::size_t count = 0;
@@ -359,13 +359,14 @@ class Client {
     return avatars;
   }
 
-  /// Returns the server time in seconds. Empty before the first pose or pong.
+  /// Returns the server time in seconds. Returns nullopt before the first pose or pong.
   std::optional<double> ServerTime() const {
     double time_s = 0.0;
     if (stridewire_client_server_time(handle_, &time_s) != STRIDEWIRE_OK) return std::nullopt;
     return time_s;
   }
-  /// Returns the time at which to sample poses, in seconds. Empty before the first pose or pong.
+  /// Returns the time at which to sample poses, in seconds. Returns nullopt before the first pose
+  /// or pong.
   std::optional<double> RenderTime() const {
     double time_s = 0.0;
     if (stridewire_client_render_time(handle_, &time_s) != STRIDEWIRE_OK) return std::nullopt;
@@ -402,8 +403,8 @@ class Client {
  private:
   explicit Client(stridewire_client* handle) : handle_(handle) {}
 
-  // Calls `call` with the pose's own buffer, and detaches the buffer again, so that a copy of the
-  // pose does not point into it.
+  // Sets the buffer of the pose, calls `call`, and removes the buffer again, so that a copy of the
+  // pose does not point to it.
   template <typename Call>
   static Result Fill(Pose& pose, const Call& call) {
     pose.rotations.resize(STRIDEWIRE_MAX_JOINTS);

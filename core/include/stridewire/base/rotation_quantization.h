@@ -17,18 +17,18 @@ struct RotationQuantization {
   static constexpr std::uint8_t kMinFreeBits = 8;
   static constexpr std::uint8_t kMaxFreeBits = 15;
   static constexpr float kMinStep = 0x1p-20f;
-  /// Smallest permitted least_w. The decoder computes w from the other components, so the error of
-  /// a smaller w would be too large.
+  /// Minimum of least_w. The decoder computes w from the other components, so the error of a
+  /// smaller w would be too large.
   static constexpr float kMinLeastW = 0.3f;
 
   Quat reference = kIdentityQuat;
-  Vec3 low = Vec3(0.0f);  ///< Smallest value of each component, in [-1, 1].
+  Vec3 low = Vec3(0.0f);  ///< Minimum of each component, in [-1, 1].
   /// Difference between successive values, kMinStep to 2; unused if a component has no bits.
   Vec3 step = Vec3(1.0f);
   std::array<std::uint8_t, 3> bits{};  ///< Bits of each component, 0 to kMaxBits.
   /// Bits per component of smallest-three encoding, kMinFreeBits to kMaxFreeBits; 0: not used.
   std::uint8_t smallest_three_bits = 0;
-  float least_w = 1.0f;  ///< Smallest w of d, kMinLeastW to 1.
+  float least_w = 1.0f;  ///< Minimum w of d, kMinLeastW to 1.
   bool operator==(const RotationQuantization&) const = default;
 };
 

@@ -17,12 +17,12 @@ namespace stridewire {
 /// A direction along one of the file's own axes.
 enum class BvhAxis : std::uint8_t { kPlusX, kMinusX, kPlusY, kMinusY, kPlusZ, kMinusZ };
 
-/// Source of the up axis of a capture. `kGuess`: the figure stands neither in the rest pose nor in
-/// the motion.
+/// Source of the up axis of a capture. kGuess means that the figure stands neither in the rest pose
+/// nor in the motion.
 enum class UpSource : std::uint8_t { kOption, kRestPose, kMotion, kGuess };
 
-/// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y
-/// up, facing +Z at identity rotations.
+/// A complete recording that was read from a file and converted to the conventions of base/math.h:
+/// metres, +Y up, facing +Z at identity rotations.
 struct Capture {
   std::string path;   ///< Path of the file, as passed by the caller.
   Skeleton skeleton;  ///< Skeleton whose legs have both been identified.
@@ -32,7 +32,7 @@ struct Capture {
   bool unit_is_common = true;
   BvhAxis up = BvhAxis::kPlusY;  ///< The up axis of the file, detected or given.
   UpSource up_source = UpSource::kOption;
-  int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
+  int first_frame = 0;  ///< Number of frames at the start that contain an artificial rest pose.
   std::vector<std::string> notes;  ///< Assumptions and repairs of the reader, one sentence each.
 };
 
@@ -43,11 +43,12 @@ inline constexpr std::uint64_t kMaxBvhBytes = std::uint64_t{512} << 20;
 inline constexpr int kMaxBvhDepth = 128;  ///< Maximum depth of nested joints.
 /// Maximum number of frames times joints.
 inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;
-inline constexpr double kMaxBvhNumber = 1e7;  ///< Largest magnitude of any number in the file.
+inline constexpr double kMaxBvhNumber = 1e7;  ///< Maximum magnitude of any number in the file.
 
-inline constexpr std::size_t kMaxBvhNameBytes = 256;  ///< Longest name of a joint, in bytes.
+/// Maximum length of the name of a joint, in bytes.
+inline constexpr std::size_t kMaxBvhNameBytes = 256;
 
-/// Overrides for properties that the reader otherwise detects by itself.
+/// Overrides for properties that the reader otherwise detects.
 struct BvhReadOptions {
   std::optional<double> unit_m;  ///< Length of one file unit in metres, in (0, 1000].
   std::optional<BvhAxis> up;     ///< The up axis of the file.

@@ -23,8 +23,9 @@ namespace stridewire {
 /// differ in their number of joints. kIo if writing to the stream fails.
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out);
 
-/// Same, for a file. Writes a temporary file in the same folder and renames it, so that `path`
-/// holds either its previous content or the complete clip. kIo: `where` is the path.
+/// Does the same for a file. Writes a temporary file in the same folder and renames it, so that
+/// `path` contains either its previous content or the complete clip. Fails with kIo, with the path
+/// in Error::where.
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip,
                               const std::filesystem::path& path);
 

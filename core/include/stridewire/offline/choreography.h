@@ -18,9 +18,9 @@ namespace stridewire {
 inline constexpr std::size_t kMaxChoreographyBytes = std::size_t{4} << 20;
 inline constexpr std::size_t kMaxChoreographyMovements = 65'536;
 inline constexpr int kMaxChoreographyDepth = 16;  ///< Maximum depth of nested JSON values.
-/// Largest magnitude of a start coordinate.
+/// Maximum magnitude of a start coordinate.
 inline constexpr double kMaxChoreographyPositionM = 1e5;
-/// Largest magnitude of the start heading.
+/// Maximum magnitude of the start heading.
 inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 
 /// A start position and a list of movements that an avatar plays one after the other. As JSON:
@@ -55,18 +55,18 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 struct Choreography {
   BaseFrame start;
   std::shared_ptr<const Terrain> terrain;  ///< Terrain of the world; null: flat ground.
-  /// Together with `layers` 1 to kMaxChoreographyMovements entries. The id of a request is its
-  /// position in the JSON list, counted from 1 and including layers.
+  /// Together with `layers`, 1 to kMaxChoreographyMovements entries. The id of a request is its
+  /// position in the JSON list, which starts at 1 and includes layers.
   std::vector<MovementRequest> movements;
   std::vector<LayerCue> layers;
 };
 
-/// Reads a choreography. It checks numbers against the limits in movement_request.h. It does not
-/// check whether a library supports the movements; use ValidateRequest for that.
+/// Reads a choreography. Checks numbers against the limits in movement_request.h, but not whether a
+/// library supports the movements. For that, use ValidateRequest.
 ///
-/// Errors: kNotFound or kIo with the file in `where`. kMalformed with "file:line:column" if the
-/// text is not JSON. kMalformed, kOutOfRange, kShapeMismatch or kUnsupported with the field, for
-/// example "c.json: movements[3].step.length_m". kLimitExceeded with the file or the field.
+/// Errors: kNotFound or kIo, with the file in Error::where. kMalformed, with "file:line:column", if
+/// the text is not JSON. kMalformed, kOutOfRange, kShapeMismatch or kUnsupported, with the field,
+/// for example "c.json: movements[3].step.length_m". kLimitExceeded, with the file or the field.
 [[nodiscard]] Expected<Choreography> ReadChoreography(const std::filesystem::path& path);
 
 /// Same as ReadChoreography, for text in memory. `name` replaces the path in errors.

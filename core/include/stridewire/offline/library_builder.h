@@ -15,25 +15,25 @@ namespace stridewire {
 
 /// Determines which of the extracted examples LibraryBuilder keeps.
 struct SelectionOptions {
-  /// Upper bound on the error of a step that is left out: the mean distance between its joints and
-  /// those of the step blended from the kept examples, at equal generic times. It also bounds how
-  /// far the step's parameters lie outside the hull of the kept examples, grown by 10 %. Metres;
-  /// one radian counts as 0.5 m. 0 keeps every step.
+  /// Maximum error of a step that is not kept: the mean distance between its joints and those of
+  /// the step blended from the kept examples, at equal generic times. It is also the maximum
+  /// distance between the step's parameters and the hull of the kept examples, enlarged by 10 %. In
+  /// metres; one radian counts as 0.5 m. 0 keeps every step.
   double max_pose_error_m = 0.0;
-  /// All other steps predict the pose and the duration of a step from its parameters. The step is
+  /// For each step, the other steps predict its pose and duration from its parameters. The step is
   /// an outlier if the error of a prediction exceeds the median error of the group by more than
   /// this number of deviations (1.4826 MAD). Only steps inside the hull of the others are tested,
-  /// in groups of at least eight, and at most one in ten is removed: steps at the edge of the hull
-  /// are rare, not wrong. 0 disables the test.
+  /// in groups of at least eight. At most one in ten is removed, because steps at the border of the
+  /// hull are rare, not wrong. 0 disables the test.
   double outlier_deviations = 0.0;
 };
 
-/// The use that LibraryBuilder makes of an extracted example.
+/// How LibraryBuilder uses an extracted example.
 enum class ExampleFate : std::uint8_t {
-  kKept,       ///< Stored as an example of its own.
+  kKept,       ///< Stored as a separate example.
   kAveraged,   ///< Stored as part of an average.
-  kRedundant,  ///< Left out because the kept examples reproduce it.
-  kOutlier     ///< Left out because it differs from all other examples.
+  kRedundant,  ///< Not stored, because the kept examples reproduce it.
+  kOutlier     ///< Not stored, because it differs from all other examples.
 };
 
 /// Returns "kept", "averaged", "redundant" or "outlier".
@@ -44,9 +44,10 @@ struct SelectedExample {
   std::string source;  ///< RawExample::source.
   bool mirrored = false;
   ExampleFate fate = ExampleFate::kKept;
-  int example = -1;      ///< Index in the library's group; -1 if left out.
-  double error_m = 0.0;  ///< If left out: distance to the step blended with its parameters, metres.
-  std::string reason;    ///< One sentence.
+  int example = -1;  ///< Index in the library's group; -1 if not stored.
+  /// If not stored: distance to the step blended with its parameters, in metres.
+  double error_m = 0.0;
+  std::string reason;  ///< One sentence.
 };
 
 /// The selection of one group, in the order of RawGroup::examples.
@@ -54,7 +55,7 @@ struct GroupSelection {
   int group = 0;  ///< Index in MotionLibrary::groups().
   MovementKind kind = MovementKind::kStepLeft;
   std::vector<SelectedExample> examples;
-  /// Ridge factor with which the stored examples were smoothed (LibraryBuilder::smooths); 0 if they
+  /// Ridge factor with which the stored examples were smoothed (LibraryBuilder::smooths). 0 if they
   /// are stored as captured.
   double ridge = 0.0;
   double ridge_radius = 0.0;  ///< Radius of the radial functions, in units of Parameter::scale.
@@ -72,18 +73,18 @@ struct LibraryBuilder {
   /// movements that the rest reproduces within 2.5 cm, and smooths what remains.
   [[nodiscard]] static LibraryBuilder Selecting();
 
-  /// Grid cells per second of mean duration, approximately. Intervals where an example would
-  /// otherwise be stored with an error above 0.45 degrees get more.
+  /// Approximate number of grid cells per second of mean duration. Intervals in which an example
+  /// would be stored with an error above 0.45 degrees have more cells.
   double grid_fps = 30.0;
-  /// Averages examples whose parameters all lie within this distance of each other, in metres; a
-  /// radian counts as 0.5 m. Uses complete linkage. 0: averages nothing.
+  /// Examples are averaged if all their parameters are within this distance of each other, in
+  /// metres; a radian counts as 0.5 m. Uses complete linkage. 0 disables averaging.
   double cluster_diameter = 0.0;
-  /// Determines which examples are left out after averaging; by default none.
+  /// Determines which examples are not stored after averaging. By default, all are stored.
   SelectionOptions selection;
-  /// Replaces the selected examples by a smooth function of their parameters that is robust against
-  /// outliers. This keeps what the examples have in common and removes individual variation.
-  /// Leave-one-out pose errors determine the smoothness. Groups with fewer than 4 (d + 1) examples
-  /// (d parameters) remain unchanged.
+  /// True: the selected examples are replaced with a smooth function of their parameters that is
+  /// robust against outliers. It contains what the examples have in common, without individual
+  /// variation. Leave-one-out pose errors determine the smoothness. Groups with fewer than 4 (d +
+  /// 1) examples (d parameters) remain unchanged.
   bool smooths = false;
 
   struct Note {
@@ -94,7 +95,8 @@ struct LibraryBuilder {
   std::vector<Note> notes;
   std::vector<GroupSelection> selections;  ///< Output of Build, one per group.
 
-  /// Errors: kOutOfRange, kShapeMismatch or kIllConditioned; `where` names the group and example.
+  /// Errors: kOutOfRange, kShapeMismatch or kIllConditioned, with the group and the example in
+  /// Error::where.
   [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Build(const RawLibrary& raw);
 };
 

@@ -9,9 +9,9 @@
 
 namespace stridewire {
 
-/// One movement, cut out of a capture or generated, in normalised form. It starts at its first
-/// keytime at time 0, with the root at x = z = 0 and heading 0. Heights (y) are relative to the
-/// ground under the fixed foot. The clip covers [0, last keytime] and may contain later frames.
+/// One movement, cut out of a capture or generated. It starts at its first keytime at time 0, with
+/// the root at x = z = 0 and heading 0. Heights (y) are relative to the ground under the fixed
+/// foot. The clip covers [0, last keytime] and may contain later frames.
 struct RawExample {
   Clip clip;
   std::vector<double> keytimes_s;   ///< K_0 = 0 < ... < K_n.
@@ -28,7 +28,7 @@ struct RawGroup {
   std::vector<ParameterName> parameters;
   std::vector<RawExample> examples;
   /// True if all examples were generated because the captures lack such movements. LibraryBuilder
-  /// stores them all, and requests use them only where captured groups do not fit.
+  /// stores all of them. Requests use them only if captured groups do not fit.
   bool is_completed = false;
 };
 
@@ -42,13 +42,13 @@ struct RawLayer {
   std::string source;
 };
 
-/// The editable form of a motion library. LibraryBuilder turns it into an immutable MotionLibrary.
+/// The editable form of a motion library. LibraryBuilder converts it to an immutable MotionLibrary.
 struct RawLibrary {
   Skeleton skeleton;
   /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
   Pose stand_pose;
-  /// Measures how far the soles of `stand_pose` are from flat on the ground; 0: they are flat.
-  /// CompleteLibrary replaces stand poses with tilted soles.
+  /// Height differences by which the soles of `stand_pose` deviate from flat soles; 0 if they are
+  /// flat. CompleteLibrary replaces stand poses with tilted soles.
   double stand_tilt_m = 0.0;
   std::vector<RawGroup> groups;
   std::vector<RawLayer> layers;

@@ -18,7 +18,7 @@ struct PlantRecord {
   Foot foot = Foot::kLeft;
   double from_s = 0.0;
   double to_s = 0.0;
-  DVec3 anchor_m = DVec3(0.0);  ///< Target of the ball; without planting its first position.
+  DVec3 anchor_m = DVec3(0.0);  ///< Target of the ball. Without planting, its first position.
   double drift_m = 0.0;         ///< Largest horizontal distance of the ball from the anchor.
 };
 
@@ -33,8 +33,8 @@ struct MovementRecord {
   std::vector<double> keytimes_s;
   ParameterValues requested;
   ParameterValues applied;  ///< `requested` after clamping to the range of the examples.
-  /// sum w_i p_i over the examples: the parameters used for the blend. The weight correction
-  /// chooses them so that `measured` meets `applied`.
+  /// sum w_i p_i over the examples: the parameters that correspond to the weights of the blend. The
+  /// weight correction chooses the weights so that `measured` equals `applied`.
   ParameterValues corrected;
   ParameterValues measured;  ///< Parameters measured on the synthesized movement, a(p).
   bool extrapolated = false;
@@ -70,7 +70,7 @@ struct SkippedRequest {
 /// Starts, changes or stops a layer when a movement begins.
 struct LayerCue {
   /// Index of that movement in the list of requests. If it equals the number of requests, the cue
-  /// takes effect after all movements and is not visible.
+  /// takes effect after all movements and has no visible effect.
   std::size_t before = 0;
   std::string layer;  ///< Name of the layer.
   bool enabled = true;
@@ -88,7 +88,7 @@ struct Synthesis {
   std::string stop_reason;
 };
 
-inline constexpr int kMaxSynthesisFrames = 1 << 20;  ///< Longest result of Synthesize.
+inline constexpr int kMaxSynthesisFrames = 1 << 20;  ///< Maximum number of frames of a Synthesis.
 
 /// Arguments of Synthesize.
 struct SynthesisInput {
@@ -97,8 +97,8 @@ struct SynthesisInput {
   std::span<const MovementRequest> requests;
   double fps = 60.0;  ///< Ticks per second, 10 to 1000.
   AvatarOptions options;
-  /// Must be sorted by `before`. Each cue takes effect in the frame after its movement, or a step
-  /// inserted before that movement, begins.
+  /// Must be sorted by `before`. Each cue takes effect in the frame after the start of its
+  /// movement, or of a step that is inserted before that movement.
   std::span<const LayerCue> layers;
 };
 
@@ -106,8 +106,9 @@ struct SynthesisInput {
 /// idle.
 ///
 /// Errors: kUnsupported or kOutOfRange if the library rejects a request or no transition path leads
-/// to it. kLimitExceeded if the result exceeds kMaxSynthesisFrames. For layers the errors of
-/// LayerStack::Set. `where` names a movement by its index in a choreography, which counts layers.
+/// to it. kLimitExceeded if the result exceeds kMaxSynthesisFrames. For layers, the errors of
+/// LayerStack::Set. Error::where contains the index of a movement in the choreography, which counts
+/// layers.
 [[nodiscard]] Expected<Synthesis> Synthesize(const SynthesisInput& input);
 
 }  // namespace stridewire

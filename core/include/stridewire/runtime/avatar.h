@@ -35,7 +35,8 @@ enum class RequestOutcome : std::uint8_t {
   kCompleted,  ///< kFinished: the movement was played to its end, or the walk has arrived.
   kRejected,   ///< kRejected: the avatar could not execute the request.
   kCancelled,  ///< kDropped: CancelQueue or Teleport dropped the request.
-  /// kDropped or kFinished: a request with an interrupt dropped it or cut its movement short.
+  /// kDropped or kFinished: a request with an interrupt dropped this request, or cut its movement
+  /// short.
   kReplaced,
   kRemoved,  ///< kDropped: the avatar was removed.
 };
@@ -55,9 +56,10 @@ struct StepMeasures {
 };
 
 /// Describes by how much a rejected step or jump would have missed its request. For steps with
-/// `exact_only` the values are exact, otherwise within a few centimetres.
+/// `exact_only` the values are exact. For others, their error is a few centimetres.
 struct FootprintError {
-  /// Nearest footprint in reach. For a jump: point between the feet and heading after it.
+  /// Nearest footprint in reach. For a jump: midpoint between the feet, and heading, after the
+  /// jump.
   Footprint nearest;
   double distance_m = 0.0;  ///< Distance from `nearest` to the requested place, >= 0.
   /// Angle between the directions of the paths or between the headings, whichever is larger, >= 0.
@@ -80,7 +82,7 @@ struct AvatarEvent {
   ParameterValues requested;  ///< kStarted: parameters as requested.
   /// kStarted: parameters after clamping to the range of the examples.
   ParameterValues applied;
-  bool extrapolated = false;     ///< kStarted: `applied` lies outside the hull of the examples.
+  bool extrapolated = false;     ///< kStarted: `applied` is outside the hull of the examples.
   bool clamped = false;          ///< kStarted: `applied` differs from `requested`.
   bool is_cut_short = false;     ///< kFinished: another request interrupted the movement.
   Foot foot = Foot::kLeft;       ///< kFootStrike: the foot that landed.
@@ -116,25 +118,26 @@ enum class BlendKind : std::uint8_t {
 };
 
 struct AvatarOptions {
-  /// Correct the weights of a movement when it starts, so that the parameters measured on it equal
-  /// those applied (Section 4 of the paper).
+  /// True: the weights of a movement are corrected when it starts, so that the parameters measured
+  /// on it equal the applied parameters (Section 4 of the paper).
   bool run_time_correction = true;
-  /// Hold feet still where they land. If false, feet follow the blended pose and may slide.
+  /// True: feet stand still where they land. False: feet follow the blended pose and may slide.
   bool foot_planting = true;
   BlendKind blend = BlendKind::kInertialization;
-  /// Let standing avatars settle into the library's stand pose, breathe, sway and shift their
+  /// True: standing avatars settle into the library's stand pose, breathe, sway and shift their
   /// weight. Their feet do not move. If false, or if feet are not planted, avatars stand still in
   /// the last pose of their last movement.
   bool idle_motion = true;
-  /// Vary the duration and the pose of steps slightly, as people do. Steps meet their parameters
-  /// and footprints as accurately as without. Steps with `exact_only` do not vary. False by
-  /// default, because each avatar needs its own `seed`; the server and `synthesize` set both.
+  /// True: the duration and the pose of steps vary slightly, as those of people do. Steps meet
+  /// their parameters and footprints as accurately as without variation. Steps with `exact_only` do
+  /// not vary. The default is false, because each avatar needs a different `seed`. The server and
+  /// `synthesize` set both.
   bool stride_variation = false;
-  /// Selects the place in the loop of the idle motion and the variation of steps, so that avatars
-  /// of a crowd do not move in unison.
+  /// Determines the starting point in the loop of the idle motion, and the variation of steps, so
+  /// that avatars of a crowd do not move in unison.
   std::uint64_t seed = 0;
-  /// Ground that the feet land on. Null: level ground at the avatar's height; requests with a
-  /// height then raise or lower it.
+  /// Ground on which the feet land. Null: level ground at the avatar's height, which requests with
+  /// a height then change.
   std::shared_ptr<const Terrain> terrain;
 };
 
@@ -161,14 +164,14 @@ class Avatar {
   Avatar(Avatar&&) noexcept;
   Avatar& operator=(Avatar&&) noexcept;
 
-  /// Validates and queues a request. A request that interrupts empties the queue first.
+  /// Validates and queues a request. A request with an interrupt first empties the queue.
   ///
-  /// Errors: those of ValidateRequest; kUnsupported: exact placement was requested while feet are
-  /// not planted; kLimitExceeded: the queue holds kMaxQueue requests.
+  /// Errors: those of ValidateRequest; kUnsupported if exact placement is requested while feet are
+  /// not planted; kLimitExceeded if the queue contains kMaxQueue requests.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
   /// Drops the requests that have not started and returns their number. A walk in progress counts
-  /// as one of them and ends with its current step. The next Advance reports the dropped requests.
+  /// as one of them. It ends with its current step. The next Advance reports the dropped requests.
   int CancelQueue();
 
   /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not
@@ -176,19 +179,20 @@ class Avatar {
   /// layers are already playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
-  /// Moves the avatar to `start` at once, standing. Drops the current movement and the queue, and
-  /// keeps the layers.
+  /// Moves the avatar to `start` at once. It then stands. Drops the current movement and the queue,
+  /// and keeps the layers.
   void Teleport(const BaseFrame& start);
 
-  /// Enables or disables foot planting for the movements that start from now on. Fails with
-  /// kUnsupported if the library's skeleton does not support foot planting.
+  /// Enables or disables foot planting from the next movement on. Fails with kUnsupported if the
+  /// library's skeleton does not support foot planting.
   [[nodiscard]] Status SetFootPlanting(bool enabled);
 
   /// Replaces the terrain. Standing feet keep their positions until their next step.
   void SetTerrain(std::shared_ptr<const Terrain> terrain);
 
-  /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, updates the pose.
-  /// The first call allocates scratch memory; avatars of an AvatarCrowd share that of the crowd.
+  /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, and updates the
+  /// pose. The first call allocates scratch memory. In an AvatarCrowd, the avatars share scratch
+  /// memory.
   void Advance(double dt_s);
 
   /// Displayed pose in world space. Valid until the next call that is not const.
@@ -211,8 +215,9 @@ class Avatar {
   std::unique_ptr<AvatarSimulation> simulation_;
 };
 
-/// Advances many avatars of one library together, several times as fast as one by one. Every pose
-/// has the same bytes as if the avatar had been advanced alone. Owns scratch memory only.
+/// Advances many avatars of one library together, which is several times as fast as one by one.
+/// Every pose has the same bytes as if its avatar had been advanced alone. Contains only scratch
+/// memory.
 class AvatarCrowd {
  public:
   explicit AvatarCrowd(std::shared_ptr<const MotionLibrary> library);
@@ -232,7 +237,7 @@ class AvatarCrowd {
 /// Range of the speeds at which the avatars of a library walk straight ahead on level ground.
 struct WalkSpeeds {
   double slowest_m_s = 0.0;
-  double fastest_m_s = 0.0;  ///< 0 if the library cannot walk far enough to measure its speed.
+  double fastest_m_s = 0.0;  ///< 0 if the library cannot walk far enough for measuring its speed.
 
   /// Speeds that differ by this fraction count as equal, because strides vary.
   static constexpr double kTolerance = 0.05;

@@ -14,8 +14,8 @@ namespace stridewire {
 struct Clip {
   double fps = 0.0;  ///< Frames per second, in (0, 10000].
   int joint_count = 0;
-  std::vector<Vec3> root_positions_m;  ///< [frame]: position of the root
-  std::vector<Quat> rotations;         ///< Rotation of a joint: [frame * joint_count + joint]
+  std::vector<Vec3> root_positions_m;  ///< [frame]: position of the root.
+  std::vector<Quat> rotations;         ///< [frame * joint_count + joint]: rotation of a joint.
 
   [[nodiscard]] int frame_count() const { return static_cast<int>(root_positions_m.size()); }
   [[nodiscard]] double duration_s() const {
@@ -47,8 +47,8 @@ struct Clip {
   [[nodiscard]] Status Validate() const;
 };
 
-/// Negates quaternions where necessary, so that those of each joint do not change sign from one
-/// frame to the next.
+/// Negates quaternions where necessary, so that the sign of each joint's quaternion does not change
+/// between successive frames.
 void MakeSignContinuous(Clip& clip);
 
 /// Samples the pose at `time_s`, clamped to the duration of the clip. Interpolates positions and

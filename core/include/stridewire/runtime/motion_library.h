@@ -38,7 +38,7 @@ enum class MovementKind : std::uint8_t {
   return step == MovementKind::kStepLeft ? Foot::kLeft : Foot::kRight;
 }
 
-/// Parameters that a group may have. General steps have the first seven in this order (method,
+/// Parameters that a group may have. General steps have the first seven in this order (paper,
 /// Section 6): the vector from the fixed to the moving foot in the first pose, the same vector in
 /// the last pose, and the change of heading. Each vector is in the heading frame of its pose and is
 /// measured between the balls of the feet.
@@ -50,7 +50,7 @@ enum class ParameterName : std::uint8_t {
   kEndY = 4,
   kEndZ = 5,
   kTurn = 6,
-  kLength = 7,  ///< Jump: forward distance from the centre of the feet before to that after.
+  kLength = 7,  ///< Jump: forward distance between the midpoints of the feet before and after it.
   kHeight = 8,  ///< Jump: height of the landing place above the start.
 };
 inline constexpr int kParameterNameCount = 9;
@@ -61,8 +61,8 @@ inline constexpr int kMaxParameters = 7;
 
 struct Parameter {
   ParameterName name = ParameterName::kStartZ;
-  double min = 0.0;  ///< Smallest value among the examples.
-  double max = 0.0;  ///< Largest value among the examples.
+  double min = 0.0;  ///< Minimum over the examples.
+  double max = 0.0;  ///< Maximum over the examples.
   /// Value that is subtracted before the linear part is evaluated (Section 3: rank deficiency).
   double centre = 0.0;
   double scale = 1.0;  ///< Values are divided by it before distances are computed; > 0.
@@ -111,11 +111,11 @@ struct GridLayout {
 /// Number of floats in the longest possible grid row.
 inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 
-/// Sources of examples that were generated because the captures lack such movements begin with
+/// The sources of examples that were generated because the captures lack such movements begin with
 /// this text.
 inline constexpr std::string_view kCompletedSource = "completed";
 
-/// Longest time over which a difference pose fades out (T in Section 5 of the paper), in seconds.
+/// Maximum time over which a difference pose fades out (T in Section 5 of the paper), in seconds.
 inline constexpr double kEaseOutS = 0.2;
 
 /// Examples that can be blended with each other. They have the same kind, parameters, number of
@@ -142,14 +142,14 @@ struct MotionGroup {
   std::span<const int> cells;  ///< [interval]: number of grid cells of the keytime interval.
   int grid_point_count = 0;    ///< Sum of `cells`, plus 1.
   std::span<const double> keytimes_s;  ///< [example][interval + 1]: keytimes, with K_0 = 0.
-  /// [example]: heading at the end of the example; it starts at 0.
+  /// [example]: heading at the end, relative to the start.
   std::span<const double> heading_change_rad;
   /// [grid point][example][row_floats]: rows of the grid, 64-byte aligned.
   std::span<const float> grid;
   /// [example]: origin, for example "16_21.bvh 0.93-1.47 s".
   std::vector<std::string_view> sources;
   std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if it is a mirrored copy, else 0.
-  double ease_out_s = kEaseOutS;           ///< Longest time over which difference poses fade out.
+  double ease_out_s = kEaseOutS;           ///< Maximum time over which difference poses fade out.
   /// True if the sources of all examples begin with kCompletedSource. Requests prefer other groups.
   bool is_completed = false;
 
@@ -206,7 +206,7 @@ class MotionLibrary {
   /// True if the library has motion for standing avatars. It is generated from the stand pose if
   /// feet can be planted (LegRig::is_usable).
   [[nodiscard]] bool has_stand_motion() const { return stand_motion_ != nullptr; }
-  /// Index of the group that holds the stand pose, into which avatars blend after their last step.
+  /// Index of the group with the stand pose, into which avatars blend after their last step.
   [[nodiscard]] int settle_group() const { return static_cast<int>(file_group_count_); }
   /// Index of the group with the loop that standing avatars play.
   [[nodiscard]] int idle_group() const { return static_cast<int>(file_group_count_) + 1; }
@@ -217,8 +217,8 @@ class MotionLibrary {
   /// Transitions between movements as a table [from][to]. Each index is a group, or the number of
   /// groups for the stand. Empty if the library file contains no transitions.
   [[nodiscard]] std::span<const Transition> transitions() const;
-  /// Returns the transition between two groups. The number of groups as index means the stand.
-  /// Returns null if the library file contains no transitions.
+  /// Returns the transition between two groups. As an index, the number of groups stands for the
+  /// stand. Returns null if the library file contains no transitions.
   [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const;
   /// Pose of an avatar that has just been spawned, relative to its base frame. The root is at
   /// x = z = 0 with heading 0, and y is above the ground.
@@ -231,7 +231,7 @@ class MotionLibrary {
   [[nodiscard]] const std::string& hash() const { return hash_; }
   /// Content of the library file, including its header.
   [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
-  /// Largest number of examples in a group. Callers size scratch memory with it.
+  /// Maximum number of examples in a group. It determines the size of scratch memory.
   [[nodiscard]] int max_example_count() const { return max_example_count_; }
 
  private:

@@ -27,7 +27,7 @@ struct Footprint {
   double heading_rad = 0.0;
 };
 
-/// A requested footprint. Without `heading_rad`, the foot gets the heading that the avatar has when
+/// A requested footprint. Without `heading_rad`, the heading of the foot is that of the avatar when
 /// the step begins.
 struct FootprintRequest {
   DVec3 position_m = DVec3(0.0);
@@ -39,7 +39,8 @@ struct FootprintRequest {
 struct StepRequest {
   std::optional<Foot> foot;  ///< Moving foot. Default: the foot that did not move last.
   double length_m = 0.0;     ///< Forward distance between the feet at the end; 0: side by side.
-  /// Sideways distance from the fixed to the moving foot, positive to the side of the moving foot.
+  /// Sideways distance from the fixed to the moving foot, positive towards the side of the moving
+  /// foot.
   std::optional<double> side_m;
   double height_m = 0.0;  ///< Height of the moving foot above the fixed foot at the end.
   double turn_rad = 0.0;  ///< Change of heading; positive turns left.
@@ -48,8 +49,8 @@ struct StepRequest {
   /// If the foot cannot land exactly at its place when the step is about to start, the request is
   /// rejected. Requires foot planting.
   bool exact_only = false;
-  /// Plays the nearest step of the library, however far it is from the request. Otherwise, errors
-  /// above kMaxRequestErrorM or kMaxRequestErrorRad cause a rejection.
+  /// True: the avatar plays the nearest step of the library, however far it is from the request.
+  /// False: the step is rejected if its errors exceed kMaxRequestErrorM or kMaxRequestErrorRad.
   bool allow_nearest = false;
 };
 
@@ -57,7 +58,7 @@ struct JumpRequest {
   double length_m = 0.0;  ///< Forward distance.
   double height_m = 0.0;  ///< Height of the landing place above the start.
   double turn_rad = 0.0;  ///< Change of heading; positive turns left.
-  /// Plays the nearest jump, however far it is from the request, as in StepRequest.
+  /// True: the avatar plays the nearest jump, however far it is from the request. See StepRequest.
   bool allow_nearest = false;
 };
 
@@ -71,10 +72,11 @@ struct StandRequest {
 /// with this id follows. If the walk fails, a kRejected event contains the reason. If the walk is
 /// dropped in progress, a kDropped event follows after its current step.
 struct WalkRequest {
-  DVec3 position_m = DVec3(0.0);   ///< Base frame at the end. y is ignored; the ground sets it.
+  /// Base frame at the end. y is ignored, because the ground determines it.
+  DVec3 position_m = DVec3(0.0);
   double heading_rad = 0.0;        ///< Heading of the base frame at the end.
   std::vector<DVec3> waypoints_m;  ///< Points to pass in this order; at most kMaxWaypoints.
-  /// Walking speed, as far as the library's steps allow (WalkSpeeds).
+  /// Walking speed. It is met as closely as the library's steps allow (WalkSpeeds).
   std::optional<double> speed_m_s;
 };
 
@@ -84,10 +86,13 @@ enum class Interrupt : std::uint8_t {
   /// The request begins after the current movement. A current stand or walk ends. The queue is
   /// dropped.
   kAfterMovement,
-  /// The request begins at once if both feet stand, otherwise as soon as they have landed. The
-  /// queue is dropped. If a step or walk that moves the swinging foot is requested early enough in
-  /// the swing (AvatarSimulation::kLeastSwingLeft), the foot is redirected to the new footprint.
-  /// For a stand or jump, the step is shortened, if possible so that it brings the feet together.
+  /// The request begins at once if both feet stand, and otherwise as soon as they have landed. The
+  /// queue is dropped.
+  ///
+  /// The current step changes if enough of its swing remains (AvatarSimulation::kLeastSwingLeft).
+  /// If the request is a step of the swinging foot, or a walk that begins with one, the foot is
+  /// redirected to the new footprint. For a stand or jump, the step is shortened. If possible, the
+  /// shortened step brings the feet together.
   kNow,
 };
 
@@ -102,28 +107,29 @@ struct LayerRequest {
   int layer = 0;  ///< Index in MotionLibrary::layers().
   /// True starts or changes the layer. False ends it; weight and speed are then ignored.
   bool enabled = true;
-  double weight = 1.0;   ///< Factor for the joint weights of the clip, in (0, 1].
-  double blend_s = 0.3;  ///< Seconds until weight and speed are reached, in [0, kMaxLayerBlendS].
-  double speed = 1.0;    ///< Playback speed, kMinLayerSpeed to kMaxLayerSpeed; 1: as recorded.
+  double weight = 1.0;  ///< Factor for the joint weights of the clip, in (0, 1].
+  /// Seconds over which weight and speed change to these values, in [0, kMaxLayerBlendS].
+  double blend_s = 0.3;
+  double speed = 1.0;  ///< Playback speed, kMinLayerSpeed to kMaxLayerSpeed; 1: as recorded.
 };
 inline constexpr double kMaxLayerBlendS = 10.0;
 inline constexpr double kMinLayerSpeed = 0.1;
 inline constexpr double kMaxLayerSpeed = 4.0;
 
-/// A step or jump is rejected before it starts if it would end more than kMaxRequestErrorM from the
-/// requested place, or if its direction or heading would be off by more than kMaxRequestErrorRad.
-/// With `allow_nearest`, the avatar plays the nearest step or jump instead.
+/// Maximum errors of steps and jumps. If the place would be missed by more than kMaxRequestErrorM,
+/// or the direction or the heading by more than kMaxRequestErrorRad, the step or jump is rejected
+/// before it starts. With `allow_nearest`, the avatar plays the nearest step or jump instead.
 inline constexpr double kMaxRequestErrorM = 0.2;
 inline constexpr double kMaxRequestErrorRad = 1.0471975511965976;  ///< 60 degrees.
 
-/// Limits on requests. They reject absurd values only, and are far wider than the range of any
-/// library.
+/// Limits on requests. They are far wider than the range of any library, so they reject only absurd
+/// values.
 inline constexpr double kMaxRequestLengthM = 10.0;  ///< Magnitude of lengths, sides and heights.
 inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;
-/// Largest magnitude of a coordinate of a goal, waypoint or footprint.
+/// Maximum magnitude of a coordinate of a goal, waypoint or footprint.
 inline constexpr double kMaxWalkPositionM = 1e6;
-inline constexpr double kMaxWalkHeadingRad = 1e4;  ///< Largest magnitude of a heading.
+inline constexpr double kMaxWalkHeadingRad = 1e4;  ///< Maximum magnitude of a heading.
 inline constexpr double kMinWalkSpeedMPerS = 0.05;
 inline constexpr double kMaxWalkSpeedMPerS = 5.0;
 inline constexpr std::size_t kMaxWaypoints = 64;

@@ -9,9 +9,9 @@
 
 namespace stridewire {
 
-/// Borrowed pose: the position of the root and one rotation per joint. rotations[0] is that of the
-/// root, relative to the world or to a base frame. The others are relative to the parent joint.
-/// This is the posture of the paper, in which only the root has a translation.
+/// Borrowed pose: the position of the root and one rotation per joint. rotations[0] is the rotation
+/// of the root, relative to the world or to a base frame. The others are relative to the parent
+/// joint. The paper calls this a posture. Only the root has a translation.
 struct ConstPoseSpan {
   const Vec3& root_position_m;
   std::span<const Quat> rotations;

@@ -18,7 +18,7 @@ enum class Foot : std::uint8_t { kLeft = 0, kRight = 1 };
 
 struct Joint {
   std::string name;
-  int parent = -1;  ///< Index of the parent, always smaller than its own; -1 for the root.
+  int parent = -1;  ///< Index of the parent, always below the joint's own index; -1 for the root.
   Vec3 offset_m = Vec3(0.0f);  ///< Position in the frame of the parent; unused for the root.
 };
 
@@ -29,8 +29,8 @@ struct EndSite {
 };
 
 /// Indices of the joints of one leg. Positions of feet are measured at the ball, because a standing
-/// foot rolls: during a step the ankle drifts by 6.5 cm, the ball only by 3.6 cm. If the skeleton
-/// has no toe joint, `ball` is the ankle and `ball_offset_m` the position of the ball.
+/// foot rolls: during a step, the ankle drifts by 6.5 cm, but the ball only by 3.6 cm. If the
+/// skeleton has no toe joint, `ball` is the ankle, and `ball_offset_m` is the position of the ball.
 struct Leg {
   int hip = -1;
   int knee = -1;

@@ -16,12 +16,12 @@ namespace stridewire {
 inline constexpr std::int32_t kMaxTerrainColumns = 1024;
 inline constexpr std::int32_t kMaxTerrainRows = 1024;
 inline constexpr std::size_t kMaxTerrainBoxes = 65'536;
-inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Largest magnitude of a ground height.
-/// Smallest distance between samples of a height field.
+inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Maximum magnitude of a ground height.
+/// Minimum distance between samples of a height field.
 inline constexpr double kMinTerrainCellM = 0.01;
 inline constexpr double kMaxTerrainCellM = 1e3;
-inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Largest magnitude of each coordinate.
-/// Largest number of boxes that intersect one cell of the terrain's spatial index, which bounds the
+inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Maximum magnitude of each coordinate.
+/// Maximum number of boxes that intersect one cell of the terrain's spatial index, which bounds the
 /// time of a query. Only terrains in which hundreds of boxes overlap exceed it.
 inline constexpr std::size_t kMaxTerrainBoxesPerCell = 256;
 
@@ -61,7 +61,7 @@ struct TerrainData {
   bool operator==(const TerrainData&) const = default;
 };
 
-/// The ground that feet land on: a height field, y = 0 outside of it, and boxes.
+/// The ground on which feet land: a height field, y = 0 outside of it, and boxes.
 ///
 ///   height(x, z) = max(field(x, z) or 0, tops of all boxes that contain (x, z))
 ///
@@ -72,10 +72,10 @@ class Terrain {
  public:
   /// Validates `data` and builds the spatial index.
   ///
-  /// Errors, with the field in `where`, for example "boxes[3].max_m": kOutOfRange if a number is
-  /// not finite or exceeds its limit, or max_m does not exceed min_m. kShapeMismatch if the size of
-  /// heights_m is not columns x rows. kLimitExceeded if there are too many boxes, in total or in
-  /// one cell of the index.
+  /// Errors, with the field in Error::where, for example "boxes[3].max_m": kOutOfRange if a number
+  /// is not finite or exceeds its limit, or if max_m does not exceed min_m. kShapeMismatch if the
+  /// size of heights_m is not columns x rows. kLimitExceeded if there are too many boxes, in total
+  /// or in one cell of the index.
   [[nodiscard]] static Expected<std::shared_ptr<const Terrain>> Make(TerrainData data);
 
   [[nodiscard]] const TerrainData& data() const { return data_; }
@@ -83,15 +83,16 @@ class Terrain {
   /// Returns the height of the ground in metres.
   [[nodiscard]] double HeightAt(double x_m, double z_m) const;
 
-  /// Returns the unit normal of the ground. It is vertical outside the field and on a box, also if
-  /// the box is level with the field. In the field it is the normal of the bilinear cell that
-  /// contains the point, and is not continuous between cells. A point on the border of two cells
-  /// belongs to the one with larger coordinates, at the end of the field to the last cell.
+  /// Returns the unit normal of the ground. It is vertical outside the field and on a box, even if
+  /// the box is level with the field. In the field, it is the normal of the bilinear cell that
+  /// contains the point, so it is not continuous between cells. A point on the border of two cells
+  /// belongs to the cell with larger coordinates, and at the end of the field to the last cell.
   [[nodiscard]] Vec3 NormalAt(double x_m, double z_m) const;
 
   /// Returns an upper bound for the height of the ground in a closed disc. It is exact for boxes
-  /// and for y = 0 outside the field. For the field it is the maximum over the square that encloses
-  /// the disc. A radius <= 0 means a point. The time grows with the square of the radius.
+  /// and for y = 0 outside the field. For the field, it is the maximum over the square that
+  /// encloses the disc. A radius <= 0 stands for a point. The time grows with the square of the
+  /// radius.
   [[nodiscard]] double HighestWithin(double x_m, double z_m, double radius_m) const;
 
  private:

@@ -21,13 +21,13 @@ inline constexpr double kClipFps = 120.0;
 [[nodiscard]] double StepTime(double length_m, double rise_m, StepStyle style);
 
 /// Pitch of a foot while it rolls over its ball, as fractions of its pitch at toe-off. Rates are
-/// changes per half of double support. "The state" is the middle of double support (GaitState).
+/// changes per half of double support. The other foot lands at the start of double support.
 struct RollOff {
   double heel_rise_swing;  ///< Fraction of the swing of the other foot at which the heel rises.
   double strike;           ///< Pitch when the other foot lands.
   double strike_rate;      ///< Rate when the other foot lands.
-  double state;            ///< Pitch in the state.
-  double state_rate;       ///< Rate in the state.
+  double state;            ///< Pitch in the middle of double support.
+  double state_rate;       ///< Rate in the middle of double support.
   double toe_off_rate;     ///< Rate at toe-off.
   double toe_rock;         ///< Angle of the toes about their tip at toe-off.
   double swing;            ///< Pitch in the middle of the swing.

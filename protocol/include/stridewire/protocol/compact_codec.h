@@ -41,9 +41,10 @@ struct CompactJoint {
   bool is_omitted = false;
 };
 
-/// Describes which bits of a number a 32-bit word of a pose contains.
+/// A part of a 32-bit word of an encoded pose: some bits of one of the numbers that make up the
+/// pose.
 struct CompactPart {
-  std::uint16_t row = 0;  ///< Index of the number among the numbers of a pose.
+  std::uint16_t row = 0;  ///< Index of the number in the pose.
   /// Number of bits by which to shift the number left; negative: to the right.
   std::int8_t left = 0;
   bool ends_word = false;
