@@ -357,6 +357,31 @@ class Extractor {
   std::vector<double> heading_rad_;
 };
 
+// Some conversions declare a lower frame rate than that of the recording. Steps then take several
+// seconds, and none is found. If there are several steps at a usual frame rate, returns a sentence
+// that suggests it. Otherwise, returns an empty string.
+std::string AdviseFrameRate(const Capture& capture, const ExtractOptions& options) {
+  constexpr double kUsualRates[] = {120.0, 60.0};
+  constexpr double kClearlyFaster = 1.5;
+  constexpr int kSeveral = 3;
+  Extraction most;
+  for (const double fps : kUsualRates) {
+    if (fps < kClearlyFaster * capture.clip.fps) continue;
+    Capture faster = capture;
+    faster.clip.fps = fps;
+    Extraction extraction = Extractor(faster, options).Run();
+    if (std::min(extraction.steps_left, extraction.steps_right) >
+        std::min(most.steps_left, most.steps_right)) {
+      most = std::move(extraction);
+    }
+  }
+  if (most.steps_left + most.steps_right < kSeveral) return {};
+  return Text(
+      "at %.0f frames per second there would be %d left and %d right steps, so Frame Time may be "
+      "wrong; try --fps %.0f",
+      most.fps, most.steps_left, most.steps_right, most.fps);
+}
+
 }  // namespace
 
 void MeasureStepParameters(const Skeleton& skeleton, std::span<const ParameterName> names,
@@ -371,7 +396,15 @@ void MeasureStepParameters(const Skeleton& skeleton, std::span<const ParameterNa
 }
 
 Extraction Extract(const Capture& capture, const ExtractOptions& options) {
-  return Extractor(capture, options).Run();
+  Extraction extraction = Extractor(capture, options).Run();
+  if (extraction.steps_left + extraction.steps_right + extraction.jumps == 0 &&
+      extraction.error.empty()) {
+    std::string& reason = extraction.no_movement_reason;
+    const std::string advice = AdviseFrameRate(capture, options);
+    if (!advice.empty() && !reason.empty()) reason += "; " + advice;
+    if (!advice.empty() && reason.empty()) extraction.notes.push_back(advice);
+  }
+  return extraction;
 }
 
 }  // namespace stridewire

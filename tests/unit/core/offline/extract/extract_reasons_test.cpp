@@ -45,6 +45,18 @@ TEST(ExtractReasons, ShortCapture) {
   EXPECT_THAT(ReasonsForNothing(capture), HasSubstr("lasts only 0.33 s"));
 }
 
+TEST(ExtractReasons, SlowMotion) {
+  Capture capture = SyntheticWalker().Walk(kWalk);
+  ASSERT_EQ(capture.clip.fps, 120.0);
+  capture.clip.fps = 12.0;
+  const Extraction slow = Extract(capture);
+  EXPECT_EQ(slow.steps_left + slow.steps_right + slow.jumps, 0) << slow.error;
+  std::string all = Reasons(slow);
+  for (const std::string& note : slow.notes) all += "\n" + note;
+  EXPECT_THAT(all, HasSubstr("at 120 frames per second there would be 2 left and 2 right steps"));
+  EXPECT_THAT(all, HasSubstr("try --fps 120"));
+}
+
 TEST(ExtractReasons, NothingMoves) {
   EXPECT_THAT(ReasonsForNothing(SyntheticWalker().Stand(3.0)), HasSubstr("nothing moves"));
 }
