@@ -44,7 +44,7 @@ for (const [placeholder, [name, extension, contents]] of Object.entries(files)) 
   const file = `${name}-${hash}.${extension}`;
   await writeFile(join(assets, file), contents);
   written.add(file);
-  // Relative, so that the pages also work below a path prefix.
+  // The path is relative, so that the pages also work below a path prefix.
   pages.forEach((page, i) => (pages[i] = page.replaceAll(`%${placeholder}%`, `assets/${file}`)));
 }
 for (const file of await readdir(assets)) {

@@ -115,7 +115,8 @@ struct BatchArrays {
   [[nodiscard]] PoseBatch view() const { return {info, avatars, flags, poses}; }
 };
 
-/// Batches, whose JSON contains decoded poses and therefore does not determine their bytes.
+/// Returns the samples of PoseBatch. Their JSON contains decoded poses, which do not determine the
+/// bytes.
 std::vector<SampleMessage> Batches() {
   static const BatchArrays full(PoseMode::kFull, 8, 3);
   static const BatchArrays quantised(PoseMode::kQuantised, 8, 3);

@@ -24,7 +24,7 @@ namespace stridewire::server {
 ///   due    [3, 9]                [1, 4]               [7]
 ///
 /// An avatar enters with the first delivery that contains its pose, and leaves with the first
-/// delivery of any mode. So each change is reported once, and moving from ring to ring is not
+/// delivery of any mode. Thus each change is reported once, and moving from ring to ring is not
 /// reported.
 class RegionMembers {
  public:

@@ -49,8 +49,8 @@ std::string SpeedNote(const WalkSpeeds& speeds, const std::vector<protocol::Requ
 
 // Upper bound for the size of a refused item in a Reply.
 constexpr std::size_t kReplyItemBytes = 256;
-// Heights and boxes of a terrain that count as one item. The largest terrain then uses half of the
-// default burst.
+// This many heights or boxes of a terrain count as one item. The largest terrain then uses half of
+// the default burst.
 constexpr std::size_t kNumbersPerItem = 32;
 
 }  // namespace

@@ -12,7 +12,7 @@ using protocol::PoseMode;
 
 namespace {
 
-// Size of the states that are requested at a time, per shard.
+// Size of the states that one request to a shard asks for.
 constexpr std::size_t kStatesBytes = 100'000;
 
 }  // namespace

@@ -69,7 +69,7 @@ void main() { colour = vec4(vColour, 1.0); }`;
 
 /** Upper limit of cells drawn per side of a height field. Finer fields are subsampled. */
 const maxCells = {software: 96, hardware: 384};
-/** Upper limit of boxes drawn. If there are more, the smallest are left out. */
+/** Maximum number of boxes drawn. If there are more, the smallest are not drawn. */
 const maxBoxes = {software: 2000, hardware: 20_000};
 /** Height of the lines above the surface, so that the surface does not hide them. */
 const liftM = 0.004;

@@ -36,16 +36,16 @@ struct LeaveOneOut {
   int movements = 0;
   /// Mean differences of each method, indexed by BlendMethod.
   std::array<LeftOutMean, kBlendMethodCount> means;
-  /// Share of the movements for which kCardinal is nearer to the capture than this method, 0 to 1.
+  /// For each method, the fraction of the movements for which kCardinal is nearer to the capture.
   std::array<double, kBlendMethodCount> wins{};
 };
 
 /// Leaves out each example of a group, synthesizes a movement with its parameters from the others
 /// and compares it with the example. kCardinal works as in avatars: near duplicates are averaged
 /// (see CompleteLinkage; a radian counts as kMetresPerRadian), parameters are projected onto the
-/// hull of the others, grown by 10 %, and weights are corrected. Distances of parameters are scaled
-/// as for the weights. Uses all processors; the result does not depend on their number. Groups with
-/// fewer than three examples give an empty result (movements 0).
+/// hull of the others, enlarged by 10 %, and weights are corrected. Distances of parameters are
+/// scaled as for the weights. Uses all processors; the result does not depend on their number.
+/// Groups with fewer than three examples give an empty result (movements 0).
 [[nodiscard]] LeaveOneOut MeasureLeaveOneOut(const MotionLibrary& library, int group_index,
                                              double cluster_diameter_m = 0.05);
 

@@ -188,8 +188,8 @@ class AxesFinder {
   }
 
   // Returns the up axis of the rest pose in the world. Joints above the root may rotate the whole
-  // figure by a constant rotation. In some files this rotation converts the up axis of the figure.
-  // In others the motion of the hips undoes it. The motion determines which case applies.
+  // figure by a constant rotation. In some files the figure stands upright only with this rotation.
+  // In others the motion of the hips undoes it. The motion shows which case applies.
   DVec3 RestUpInWorld(const DVec3& mean_legs_up) const {
     const DVec3 plain = AxisVector(rest_axis_);
     const DVec3 turned = figure_.fixed_turn * plain;

@@ -102,7 +102,7 @@ constexpr double kRoomM = 0.02;
 constexpr std::array<double, 10> kRoomShiftsM{-0.015, 0.015, -0.03, 0.03,   -0.045,
                                               0.045,  -0.06, 0.06,  -0.075, 0.075};
 
-// After this many alternatives that the library cannot reach, the planner gives the step up.
+// After this many alternatives that the library cannot reach, the planner abandons the step.
 constexpr int kMaxOutOfReach = 3;
 
 // A variation of the step towards the goal: shorter, or towards either side.
