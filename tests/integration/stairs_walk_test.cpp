@@ -1,6 +1,6 @@
 // Walks to a place at the top of a flight of stairs and back down, with random rises and treads.
-// The test measures how high feet swing, how far and how fast knees bend, and how abruptly the
-// pelvis rises and falls, and compares each with a limit derived from people.
+// The test measures how high feet swing, how far and how fast knees and ankles bend, and how
+// abruptly the pelvis rises and falls, and compares each with a limit derived from people.
 
 #include <gtest/gtest.h>
 
@@ -23,6 +23,7 @@ constexpr double kFps = 60.0;
 constexpr double kMaxSwingM = 0.2;  // Above the higher one of the two footprints.
 constexpr double kMaxKneeDeg = 120.0;
 constexpr double kMaxKneeDegPerS = 800.0;
+constexpr double kMaxAnkleDeg = 50.0;
 constexpr double kMaxAcceleration = 17.0;       // Of the pelvis, vertical, in m/s².
 constexpr double kMaxUsualAcceleration = 10.0;  // The same in 99 % of all frames.
 constexpr std::size_t kAveragedFrames = 5;
@@ -66,6 +67,7 @@ struct StairsMotion {
   double swing_m = 0.0;
   double knee_deg = 0.0;
   double knee_deg_per_s = 0.0;
+  double ankle_deg = 0.0;
   double acceleration = 0.0;
   double usual_acceleration = 0.0;
   double climb_m = 0.0;  // Largest height between footprints of successive steps.
@@ -101,6 +103,7 @@ void MeasureLegs(const MotionLibrary& library, const Synthesis& synthesis, Stair
       legs.Set(clip.frame(static_cast<int>(f)));
       balls_m.push_back(legs.Sole(foot)[1].y - rest_m);
       knees_deg.push_back(legs.KneeDegrees(foot));
+      motion.ankle_deg = std::max(motion.ankle_deg, legs.AnkleDegrees(foot));
     }
     motion.knee_deg = std::max(motion.knee_deg, std::ranges::max(knees_deg));
     for (std::size_t f = 1; f + 1 < frames; ++f) {
@@ -170,13 +173,15 @@ TEST_P(StairsWalk, StaysWithinHumanLimits) {
     motion.climb_m = LargestClimb(synthesis);
     std::printf(
         "%4.1f x %4.1f cm: feet swing up to %4.1f cm above footprints, knees %5.1f deg, %4.0f "
-        "deg/s, pelvis %4.1f m/s2, usually below %4.1f, steps climb up to %4.1f cm\n",
+        "deg/s, ankles %4.1f deg, pelvis %4.1f m/s2, usually below %4.1f, steps climb up to %4.1f "
+        "cm\n",
         1e2 * flight.rise_m, 1e2 * flight.tread_m, 1e2 * motion.swing_m, motion.knee_deg,
-        motion.knee_deg_per_s, motion.acceleration, motion.usual_acceleration,
+        motion.knee_deg_per_s, motion.ankle_deg, motion.acceleration, motion.usual_acceleration,
         1e2 * motion.climb_m);
     EXPECT_LE(motion.swing_m, kMaxSwingM);
     EXPECT_LE(motion.knee_deg, kMaxKneeDeg);
     EXPECT_LE(motion.knee_deg_per_s, kMaxKneeDegPerS);
+    EXPECT_LE(motion.ankle_deg, kMaxAnkleDeg);
     EXPECT_LE(motion.acceleration, kMaxAcceleration);
     EXPECT_LE(motion.usual_acceleration, kMaxUsualAcceleration);
     EXPECT_LE(motion.climb_m, std::max(kMaxClimbM, flight.rise_m + 1e-6));

@@ -54,6 +54,16 @@ class LegGeometry {
     return resting_[static_cast<std::size_t>(foot)];
   }
 
+  /// Flexion of the ankle in degrees: 0 if the shank is perpendicular to the sole, and positive if
+  /// the toes are up.
+  [[nodiscard]] double AnkleDegrees(Foot foot) const {
+    const Leg& leg = skeleton_.leg(foot);
+    const DVec3 shank = glm::normalize(At(leg.knee) - At(leg.ankle));
+    // The heel and the ball are equally high in the stand pose.
+    const std::array<DVec3, 3> sole = Sole(foot);
+    return std::asin(glm::dot(shank, glm::normalize(sole[1] - sole[0]))) * 180.0 / M_PI;
+  }
+
   /// Angle between thigh and shank in degrees: 0 is straight, negative means bent backward.
   [[nodiscard]] double KneeDegrees(Foot foot) const {
     const Leg& leg = skeleton_.leg(foot);

@@ -237,6 +237,27 @@ double LowerFor(const LegRig::Side& side, double blended_m, const DVec3& reach) 
 
 }  // namespace
 
+namespace {
+
+// Turns a foot about its ball, heel up, if its ankle would be flexed too far. `knee_m` is where the
+// knee would be. Everything is relative to the root. Returns the turn.
+Quat HeelRise(const LegRig::Side& bones, const Vec3& knee_m, const Vec3& ankle_m,
+              const Vec3& ball_m, double share) {
+  if (bones.foot_m < kSmallestBoneM) return kIdentityQuat;
+  const DVec3 sole = DVec3(ball_m - ankle_m);
+  const double cosine = glm::dot(glm::normalize(sole), glm::normalize(DVec3(knee_m - ankle_m)));
+  const double excess = (cosine - bones.ankle_limit_cosine) / bones.ankle_limit_sine;
+  if (excess <= 0.0) return kIdentityQuat;
+  const double grown = excess < kAnkleSoftRad ? excess * excess / (2.0 * kAnkleSoftRad)
+                                              : excess - 0.5 * kAnkleSoftRad;
+  const double half = 0.5 * kHeelRise * share * grown;
+  const double per_flat = half / std::max(std::hypot(sole.x, sole.z), double{kSmallestBoneM});
+  return glm::normalize(Quat(1.0f, static_cast<float>(sole.z * per_flat), 0.0f,
+                             static_cast<float>(-sole.x * per_flat)));
+}
+
+}  // namespace
+
 void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
                           double time_s, PoseSpan pose) {
   const FootPlan& plan = movement.feet;
@@ -296,7 +317,20 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
     const LegRig::Side& bones = rig.side(foot);
     const auto ankle = static_cast<std::size_t>(bones.ankle);
     const auto target = Vec3(side.ankle_m - moved);
-    SolveLeg(rig, foot, side.leg, target, side.turn * side.leg.world_rotations[ankle], pose);
+    const Quat rotation = side.turn * side.leg.world_rotations[ankle];
+    const Quat toes = pose.rotations[static_cast<std::size_t>(bones.chain.back())];
+    SolveLeg(rig, foot, side.leg, target, rotation, pose);
+    LegPose solved;
+    EvaluateLeg(skeleton, rig, pose, foot, solved);
+    const auto ball = Vec3(root + DVec3(side.leg.ball_m) + side.correction.offset_m - moved);
+    const Quat rise = HeelRise(bones, solved.positions_m[static_cast<std::size_t>(bones.knee)],
+                               target, ball, settled);
+    if (rise == kIdentityQuat) continue;
+    SolveLeg(rig, foot, side.leg, ball - rise * (ball - target), rise * rotation, pose);
+    if (bones.has_toe_joint) {
+      pose.rotations[static_cast<std::size_t>(bones.chain.back())] =
+          glm::conjugate(rise * rotation) * rotation * toes;
+    }
   }
   ApplyPlantFade(rig, movement, time_s, pose);
 }

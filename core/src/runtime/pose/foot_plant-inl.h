@@ -248,68 +248,123 @@ HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaVec3 reference) {
 // Newton step is as accurate as a square root and a division.
 HWY_INLINE SoaQuat Renormalize(SoaQuat q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
 
-// Target position of an ankle, relative to the root, and its rotation in world axes.
-struct AnkleTarget {
-  SoaVec3 at_m;
+// Target of a foot: positions of ankle and ball relative to the root, and the rotation of the ankle
+// in world axes.
+struct FootTarget {
+  SoaVec3 ankle_m, ball_m;
   SoaQuat rotation;
 };
 
-// Solves both legs for the given ankle targets and stores the changed rotations (hips, knees and
-// ankles).
-HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarget* targets,
-                          float* rotations, JointMap joints) {
-  struct Work {
-    SoaVec3 thigh, shank, towards, new_thigh, new_shank;
-    Float distance;
-    SoaQuat turn_thigh, turn_shank;
-  } work[2];
+// A leg while it is solved: its bones in the blended pose, and the new ones.
+struct SoaBones {
+  SoaVec3 thigh, shank, new_thigh, new_shank;
+};
+
+// Computes the new thighs and shanks with which both legs reach their targets.
+HWY_INLINE void BendLegs(const LegRig& rig, const SoaLeg* legs, const FootTarget* targets,
+                         SoaBones* work) {
+  SoaVec3 towards[2];
+  Float distances[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    const SoaLeg& leg = legs[f];
-    Work& w = work[f];
-    w.thigh = leg.positions[bones.knee] - leg.positions[bones.hip];
-    w.shank = leg.positions[bones.ankle] - leg.positions[bones.knee];
-    const SoaVec3 reach = targets[f].at_m - leg.positions[bones.hip];
-    w.distance = Sqrt(Dot(reach, reach));
-    const Mask is_away = w.distance > Float(1e-6f);
-    const Float per_distance = Float(1.0f) / Max(w.distance, Float(1e-6f));
-    w.towards = Select(is_away, reach * per_distance, {Float(0.0f), Float(-1.0f), Float(0.0f)});
+    const SoaVec3 reach = targets[f].ankle_m - legs[f].positions[bones.hip];
+    distances[f] = Sqrt(Dot(reach, reach));
+    const Mask is_away = distances[f] > Float(1e-6f);
+    const Float per_distance = Float(1.0f) / Max(distances[f], Float(1e-6f));
+    towards[f] = Select(is_away, reach * per_distance, {Float(0.0f), Float(-1.0f), Float(0.0f)});
   });
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    Work& w = work[f];
+    SoaBones& w = work[f];
     const float l1 = bones.thigh_m;
     const float l2 = bones.shank_m;
     const float shortest = (l1 > l2 ? l1 - l2 : l2 - l1) + 1e-3f * (l1 + l2);
-    const Float d = Clamp(w.distance, Float(shortest), Float(kMaxLegExtension * (l1 + l2)));
+    const Float d = Clamp(distances[f], Float(shortest), Float(kMaxLegExtension * (l1 + l2)));
     const Float a = (Float(l1 * l1 - l2 * l2) + d * d) / (d + d);
     const Float h = Sqrt(Max(Float(0.0f), Float(l1 * l1) - a * a));
     const SoaVec3 hinge = Rotate(legs[f].rotations[bones.hip], Broadcast(bones.hinge));
-    SoaVec3 pole = Cross(w.towards, KneeAxis(w.thigh, w.shank, hinge));
+    SoaVec3 pole = Cross(towards[f], KneeAxis(w.thigh, w.shank, hinge));
     const Float pole_length = Sqrt(Dot(pole, pole));
     const Mask has_pole = pole_length > Float(1e-6f);
     pole = Select(has_pole, pole * (Float(1.0f) / Max(pole_length, Float(1e-6f))),
                   {Float(0.0f), Float(0.0f), Float(1.0f)});
-    w.new_thigh = w.towards * a + pole * h;
-    w.new_shank = w.towards * d - w.new_thigh;
+    w.new_thigh = towards[f] * a + pole * h;
+    w.new_shank = towards[f] * d - w.new_thigh;
+  });
+}
+
+// Raises the heels of feet whose ankles would be flexed too far (kAnkleLimitRad): turns these feet
+// about their balls. Toes keep their rotation in the world if they have a joint. `share` scales the
+// turns. Returns whether any target has changed.
+HWY_INLINE bool RaiseHeels(const LegRig& rig, const SoaBones* work, Float share,
+                           FootTarget* targets, float* rotations, JointMap joints) {
+  Float excess[2];
+  SoaVec3 soles[2];
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    soles[f] = targets[f].ball_m - targets[f].ankle_m;
+    const SoaVec3& shank = work[f].new_shank;
+    const Float cosine = -Dot(soles[f], shank) / Sqrt(Dot(soles[f], soles[f]) * Dot(shank, shank));
+    excess[f] = DivideBy(cosine - Float(bones.ankle_limit_cosine), bones.ankle_limit_sine);
+  });
+  if (!Any(excess[0] > Float(0.0f) || excess[1] > Float(0.0f))) return false;
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const Mask is_flexed = excess[f] > Float(0.0f);
+    const Float soft = Min(excess[f], Float(static_cast<float>(kAnkleSoftRad)));
+    const Float grown = excess[f] - soft + DivideBy(soft * soft, 2.0 * kAnkleSoftRad);
+    // The tangent of half the turn, which is close to half the turn.
+    const Float half = Float(static_cast<float>(0.5 * kHeelRise)) * grown * share;
+    const SoaVec3& sole = soles[f];
+    const Float per_flat =
+        half / Max(Sqrt(sole.x * sole.x + sole.z * sole.z), Float(kSmallestBoneM));
+    const SoaQuat turn =
+        Normalise({sole.z * per_flat, Float(0.0f), -sole.x * per_flat, Float(1.0f)});
+    FootTarget& target = targets[f];
+    const SoaQuat before = target.rotation;
+    target.ankle_m = Select(is_flexed, target.ball_m - Rotate(turn, sole), target.ankle_m);
+    target.rotation = Select(is_flexed, Multiply(turn, before), before);
+    if (!bones.has_toe_joint) return;
+    float* toes = rotations + (bones.*joints)[bones.count - 1] * 4 * kBlock;
+    const SoaQuat local = LoadQuat(toes);
+    const SoaQuat world = Multiply(before, local);
+    StoreQuat(Select(is_flexed, Renormalize(Multiply(Conjugate(target.rotation), world)), local),
+              toes);
+  });
+  return true;
+}
+
+// Solves both legs for the given targets and stores the changed rotations: hips, knees, ankles and,
+// if a heel rises, toes.
+HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, Float heel_share,
+                          FootTarget* targets, float* rotations, JointMap joints) {
+  SoaBones work[2];
+  SoaQuat turn_thighs[2];
+  SoaQuat turn_shanks[2];
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const SoaLeg& leg = legs[f];
+    work[f].thigh = leg.positions[bones.knee] - leg.positions[bones.hip];
+    work[f].shank = leg.positions[bones.ankle] - leg.positions[bones.knee];
+  });
+  BendLegs(rig, legs, targets, work);
+  if (RaiseHeels(rig, work, heel_share, targets, rotations, joints)) {
+    BendLegs(rig, legs, targets, work);
+  }
+  ForBothFeet(rig, [&](const LegRig::Bones&, std::size_t f) HWY_ATTR {
+    turn_thighs[f] = ShortestArc(work[f].thigh, work[f].new_thigh);
   });
   ForBothFeet(rig, [&](const LegRig::Bones&, std::size_t f) HWY_ATTR {
-    work[f].turn_thigh = ShortestArc(work[f].thigh, work[f].new_thigh);
-  });
-  ForBothFeet(rig, [&](const LegRig::Bones&, std::size_t f) HWY_ATTR {
-    Work& w = work[f];
-    w.turn_shank = Multiply(ShortestArc(Rotate(w.turn_thigh, w.shank), w.new_shank), w.turn_thigh);
+    turn_shanks[f] = Multiply(ShortestArc(Rotate(turn_thighs[f], work[f].shank), work[f].new_shank),
+                              turn_thighs[f]);
   });
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const SoaLeg& leg = legs[f];
-    const Work& w = work[f];
     const auto store = [&](std::size_t place, SoaQuat before, SoaQuat rotation) HWY_ATTR {
       StoreQuat(Renormalize(Multiply(Conjugate(before), rotation)),
                 rotations + (bones.*joints)[place] * 4 * kBlock);
     };
     store(bones.hip, leg.rotations[bones.hip - 1],
-          Multiply(w.turn_thigh, leg.rotations[bones.hip]));
-    store(bones.knee, Multiply(w.turn_thigh, leg.rotations[bones.knee - 1]),
-          Multiply(w.turn_shank, leg.rotations[bones.knee]));
-    store(bones.ankle, Multiply(w.turn_shank, leg.rotations[bones.ankle - 1]), targets[f].rotation);
+          Multiply(turn_thighs[f], leg.rotations[bones.hip]));
+    store(bones.knee, Multiply(turn_thighs[f], leg.rotations[bones.knee - 1]),
+          Multiply(turn_shanks[f], leg.rotations[bones.knee]));
+    store(bones.ankle, Multiply(turn_shanks[f], leg.rotations[bones.ankle - 1]),
+          targets[f].rotation);
   });
 }
 
@@ -372,10 +427,18 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   SoaLeg legs[2];
   SoaCorrection corrections[2];
   SoaVec3 ankles[2];
+  SoaVec3 balls[2];
   SoaVec3 shift = {Float(0.0f), Float(0.0f), Float(0.0f)};
   Float headings[2];
   Float flatnesses[2];
   EvaluateLegs(rig, rotations, root_rotation, legs, joints);
+  // Share of what planting changes that has faded in (FootPlan::plant_fade_s).
+  const Mask is_settling = common.plant_fade_s > Float(0.0f);
+  const Float planted =
+      Select(is_settling,
+             Float(1.0f) - EaseOut((common.time_s - common.start_offset_s) /
+                                   Select(is_settling, common.plant_fade_s, Float(1.0f))),
+             Float(1.0f));
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const SoaVec3 sole = legs[f].ball - legs[f].positions[bones.ankle];
     headings[f] = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
@@ -405,16 +468,12 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
       const Float share =
           trajectory.root_weight +
           EaseOut(entered) * (Float(1.0f) - trajectory.root_weight - trajectory.root_weight);
-      const Mask is_settling = common.plant_fade_s > Float(0.0f);
-      const Float settled =
-          Float(1.0f) - EaseOut((common.time_s - common.start_offset_s) /
-                                Select(is_settling, common.plant_fade_s, Float(1.0f)));
-      const Float lifted =
-          Select(keeps_above, Select(is_settling, lift * settled, lift), Float(0.0f));
+      const Float lifted = Select(keeps_above, lift * planted, Float(0.0f));
       c.offset.y = c.offset.y + lifted;
       c.root.y = c.root.y + lifted * share;
     }
-    ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
+    balls[f] = ball + c.offset;
+    ankles[f] = balls[f] + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
     shift = shift + c.root;
   });
   shift = AddRootResidual<Float>(shift, common, common.root_residual);
@@ -449,11 +508,12 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
     }
   }
   const SoaVec3 moved = LoadVec3(local_m);
-  AnkleTarget targets[2];
+  FootTarget targets[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    targets[f] = {ankles[f] - moved, Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};
+    targets[f] = {ankles[f] - moved, balls[f] - moved,
+                  Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};
   });
-  SolveLegs(rig, legs, targets, rotations, joints);
+  SolveLegs(rig, legs, planted, targets, rotations, joints);
 }
 
 void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count) {
@@ -491,7 +551,7 @@ void PlantPose(const LegRig& rig, const PlantPoseJob& job) {
   PlantVector(rig, {plan, time_s, base_m, root_m, rotations}, 0, &LegRig::Bones::rig_joints);
   for (std::size_t c = 0; c < 3; ++c) job.root_m[c] = root_m[c * kBlock];
   for (const LegRig::Bones& bones : rig.bones) {
-    for (const std::size_t place : {bones.hip, bones.knee, bones.ankle}) {
+    for (const std::size_t place : {bones.hip, bones.knee, bones.ankle, bones.count - 1}) {
       for (std::size_t c = 0; c < 4; ++c) {
         job.rotations[4 * bones.joints[place] + c] =
             rotations[(bones.rig_joints[place] * 4 + c) * kBlock];

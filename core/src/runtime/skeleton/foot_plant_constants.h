@@ -62,6 +62,18 @@ inline constexpr double kSoleDown = 0.8;
 inline constexpr double kAheadRad = 1.0;
 inline constexpr double kReversedRad = 2.0;
 
+// If an ankle would be flexed (toes up) by more than kAnkleLimitRad beyond a right angle between
+// shank and level sole, the foot turns about its ball, heel up. The turn grows with the excess: it
+// begins gently over kAnkleSoftRad and then is kHeelRise times the excess. The factor is larger
+// than 1, because a heel that rises also bends the knee, which flexes the ankle by a quarter to two
+// thirds of the turn.
+inline constexpr double kAnkleLimitRad = 0.7;
+inline constexpr double kAnkleSoftRad = 0.1;
+inline constexpr double kHeelRise = 1.6;
+// Sine and cosine of kAnkleLimitRad.
+inline constexpr double kAnkleLimitSine = 0.644217687237691;
+inline constexpr double kAnkleLimitCosine = 0.7648421872844885;
+
 // A leg with a shorter thigh or shank cannot be planted.
 inline constexpr float kSmallestBoneM = 1e-3f;
 // The axis of a knee is the normal of the leg's plane if the sine of the knee's bend exceeds

@@ -68,6 +68,9 @@ LegRig::Bones BonesOf(const Skeleton& skeleton, Foot foot, const LegRig::Side& s
   bones.toe_height_m = static_cast<float>(side.toe_height_m);
   bones.toe_out_rad = static_cast<float>(side.toe_out_rad);
   bones.foot_m = static_cast<float>(side.foot_m);
+  bones.ankle_limit_cosine = static_cast<float>(side.ankle_limit_cosine);
+  bones.ankle_limit_sine = static_cast<float>(side.ankle_limit_sine);
+  bones.has_toe_joint = side.has_toe_joint;
   return bones;
 }
 
@@ -107,6 +110,17 @@ LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
     if (std::min(side.thigh_m, side.shank_m) < kSmallestBoneM) {
       rig.is_usable = false;
       continue;
+    }
+    side.has_toe_joint =
+        side.ankle + 2 == static_cast<int>(side.chain.size()) && leg.ball_offset_m == Vec3(0.0f);
+    // Between a vertical shank and the flat foot, the cosine of the angle is -sole_drop / length.
+    const double sole_drop_m = side.ankle_height_m - side.ball_height_m;
+    const double sole_m = std::sqrt(sole_drop_m * sole_drop_m + side.foot_m * side.foot_m);
+    if (side.foot_m >= kSmallestBoneM) {
+      side.ankle_limit_cosine =
+          (side.foot_m * kAnkleLimitSine - sole_drop_m * kAnkleLimitCosine) / sole_m;
+      side.ankle_limit_sine =
+          (side.foot_m * kAnkleLimitCosine + sole_drop_m * kAnkleLimitSine) / sole_m;
     }
     const Vec3 toes = pose.toe_tip_m - pose.ball_m;
     side.toe_m = std::sqrt(static_cast<double>(toes.x) * toes.x + toes.z * toes.z);

@@ -34,6 +34,13 @@ struct LegRig {
     Vec3 heel_m = Vec3(0.0f);
     double toe_m = 0.0;   ///< Horizontal distance from the ball to the toe tip.
     double foot_m = 0.0;  ///< Horizontal distance from the ankle to the ball in the stand pose.
+    /// Cosine and sine of the angle between shank and foot at which the flexion of the ankle is
+    /// kAnkleLimitRad.
+    double ankle_limit_cosine = 2.0;
+    double ankle_limit_sine = 1.0;
+    /// True if the last joint of the chain is the ball, and its parent the ankle: then the toes can
+    /// stay flat while the heel rises.
+    bool has_toe_joint = false;
   };
   /// The data of a side and its offsets in flat arrays, for the planting kernels.
   struct Bones {
@@ -56,6 +63,9 @@ struct LegRig {
     float toe_height_m = 0.0f;
     float toe_out_rad = 0.0f;
     float foot_m = 0.0f;
+    float ankle_limit_cosine = 2.0f;
+    float ankle_limit_sine = 1.0f;
+    bool has_toe_joint = false;
   };
 
   std::array<Side, 2> sides;   ///< [foot]
