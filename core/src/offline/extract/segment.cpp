@@ -14,6 +14,10 @@ namespace stridewire {
 namespace {
 
 constexpr double kHalfSupportDefaultS = 0.08;
+// Half of a double support lasts at least this time, or else the swing includes part of it. Between
+// keytimes that are closer, the grid of a library would be much finer than elsewhere, and blends
+// would jerk there.
+constexpr double kHalfSupportMinS = 0.02;
 // If a recording begins or ends during a double support, at least this fraction of the usual half
 // of a double support must be recorded.
 constexpr double kHalfSupportMinShare = 0.5;
@@ -130,6 +134,9 @@ class StepFinder {
     if (slide > options_.support_slide_max_m) {
       return Text("the supporting foot slides by %.2f m", slide);
     }
+    const int least = static_cast<int>(std::lround(kHalfSupportMinS * tracks_.fps));
+    step.toe_off = std::min(std::max(step.toe_off, step.start + least), step.heel_strike - 1);
+    step.heel_strike = std::max(std::min(step.heel_strike, step.end - least), step.toe_off + 1);
     step.fixed_contact = swing.fixed_index;
     step.before_contact = swing.before_index;
     step.after_contact = swing.before_index + 1;

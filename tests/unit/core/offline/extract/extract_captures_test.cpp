@@ -171,6 +171,21 @@ TEST(ExtractCaptures, RepairsKnownFlips) {
   }
 }
 
+// This walker hardly ever stands on both feet.
+TEST(ExtractCaptures, KeepsKeytimesApartInShortDoubleSupports) {
+  const std::filesystem::path file = MocapDir() / "other/pymo/AV_8Walk_Meredith_HVHA_Rep1.bvh";
+  STRIDEWIRE_SKIP_WITHOUT(file);
+  const Extraction extraction = ExtractFile(file);
+  ASSERT_GE(extraction.general_steps.size(), 12u);
+  for (const ExtractedExample& step : extraction.general_steps) {
+    const std::vector<double>& times_s = step.example.keytimes_s;
+    for (std::size_t i = 0; i + 1 < times_s.size(); ++i) {
+      // Keytimes are at frames, 120 per second.
+      EXPECT_GE(times_s[i + 1] - times_s[i], 0.02 - 0.5 / 120.0) << step.example.source;
+    }
+  }
+}
+
 TEST(ExtractCaptures, HandlesFilesOfOtherPrograms) {
   STRIDEWIRE_SKIP_WITHOUT(MocapFiles("other/daz"));
   const std::filesystem::path other = MocapDir() / "other";
