@@ -51,8 +51,8 @@ decltype(protocol::RequestItem::movement) ToMovement(const stridewire_movement& 
       step.exact_only = m.exact_only != 0;
       step.allow_nearest = m.allow_nearest != 0;
       if (m.has_at != 0) {
-        step.at.emplace().position_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
-        if (m.has_heading != 0) step.at->heading_rad = m.heading_rad;
+        step.at_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
+        if (m.has_heading != 0) step.heading_rad = m.heading_rad;
         return step;
       }
       step.length_m = m.length_m;
@@ -66,7 +66,7 @@ decltype(protocol::RequestItem::movement) ToMovement(const stridewire_movement& 
     case STRIDEWIRE_STAND: return protocol::StandMovement{m.seconds};
     case STRIDEWIRE_WALK: {
       protocol::WalkMovement walk;
-      walk.position_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
+      walk.at_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
       walk.heading_rad = m.heading_rad;
       for (std::size_t w = 0; w < m.waypoint_count; ++w) {
         const double* waypoint_m = m.waypoints_m + 3 * w;

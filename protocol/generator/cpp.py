@@ -31,7 +31,9 @@ class Cpp:
 
     def type_name(self, type_name):
         """The C++ type of the message structs for a table, struct or enum."""
-        declared = self.schema.tables.get(type_name) or self.schema.enums[type_name]
+        declared = self.schema.tables.get(type_name) or self.schema.enums.get(type_name)
+        if declared is None:  # An alternative.
+            return type_name
         return declared.attributes.get("native") or declared.attributes.get("cpp") or type_name
 
     def member(self, f):
@@ -57,6 +59,22 @@ class Cpp:
 
     def is_float(self, f):
         return f.type in ("float", "double")
+
+    def used_if(self, f, path):
+        """The condition under which a field is used: "if (!m.at_m) ", or nothing. `path` formats
+        the name of the other field."""
+        if other := f.get("with"):
+            return f"if ({path.format(other)}) "
+        if other := f.get("without"):
+            return f"if (!{path.format(other)}) "
+        return ""
+
+    def common_fields(self, table):
+        """The fields that every alternative of a table uses, without `type`."""
+        return [f for f in table.fields if "only" not in f and f.name != "type"]
+
+    def variant(self, table):
+        return f"m.{table.get('variant')}"
 
     # ---- checks
 
@@ -114,7 +132,11 @@ class Cpp:
         return [line] if line else []
 
     def check_function(self, table):
-        lines = [line for f in table.fields for line in self.check(f)]
+        fields = self.common_fields(table) if "variant" in table else table.fields
+        lines = [self.used_if(f, "m.{}") + line for f in fields for line in self.check(f)]
+        if "variant" in table:
+            lines.append("std::visit([&](const auto& used) { CheckFields(found, at, used); }, "
+                         f"{self.variant(table)});")
         if "meaning" in table:
             lines.append("if (found.ok()) CheckMeaning(found, at, m);")
         return self.function(f"void CheckFields(Findings& found, const FieldPath& at, "
@@ -139,13 +161,41 @@ class Cpp:
             return f"{m} = !{w};"
         if f.type in self.schema.enums:
             return f"{m} = static_cast<{self.type_name(f.type)}>({w});"
+        if f.get("needed") and f.default is None:
+            return f"{m} = *{w};"
         return f"{m} = static_cast<StatusCode>({w});" if "status" in f else f"{m} = {w};"
 
-    def unpack_function(self, table):
-        lines = [self.unpack(f, table.is_struct) for f in table.fields]
+    def unpack_lines(self, table):
+        fields = self.common_fields(table) if "variant" in table else table.fields
+        return [self.used_if(f, "w.{}()") + self.unpack(f, table.is_struct) for f in fields]
+
+    def unpack_function(self, table, lines, struct=None):
         return self.function(f"void Unpack([[maybe_unused]] Unpacker& u, "
                              f"[[maybe_unused]] const FieldPath& at, const wire::{table.name}& w, "
-                             f"{self.type_name(table.name)}& m)", lines)
+                             f"{self.type_name(struct or table.name)}& m)", lines)
+
+    def unpack_functions(self, table):
+        if "variant" not in table:
+            return [self.unpack_function(table, self.unpack_lines(table))]
+        enum = self.schema.enums[next(f.type for f in table.fields if f.name == "type")]
+        functions, cases = [], []
+        for value, alternative in zip(enum.values, self.schema.alternatives(table)):
+            lines = self.unpack_lines(alternative)
+            needed = [f for f in alternative.fields if value in f.get("needed", "").split()]
+            if needed:
+                absent = " || ".join(f"!w.{f.name}()" for f in needed)
+                names = " and ".join(f.name for f in needed)
+                lines = [f"if ({absent}) {{",
+                         f'  return u.Wrong(ErrorCode::kMalformed, "a {value.lower()} requires '
+                         f'{names}", At(at, "type"));', "}"] + lines
+            functions.append(self.unpack_function(table, lines, alternative.name))
+            cases.append(f"  case wire::{enum.name}::{value}: return Unpack(u, at, w, "
+                         f"{self.variant(table)}.emplace<{alternative.name}>());")
+        last = len(cases) - 1
+        lines = self.unpack_lines(table) + ["switch (w.type()) {", *cases, "}"]
+        lines.append(f'u.Known(w.type(), {last}, At(at, "type"), '
+                     f'"expected a number from 0 to {last}");')
+        return functions + [self.unpack_function(table, lines)]
 
     # ---- encoding
 
@@ -194,7 +244,49 @@ class Cpp:
             return f"&{f.name}"
         return f.name if f.type in self.schema.tables else self.wire_scalar(f)
 
+    def variant_build_function(self, table):
+        """Collects the values that the alternative uses, and then builds the table."""
+        declared, arguments = {}, ["b"]
+        for f in table.fields:
+            m = self.member(f)
+            if f.name == "type":
+                arguments.append(f"static_cast<wire::{f.type}>({self.variant(table)}.index())")
+            elif "only" not in f:
+                arguments.append(self.argument(f))
+            elif f.is_list:
+                entry = f.type if f.type not in self.schema.tables else f"const wire::{f.type}*"
+                declared[f.name] = f"Offset<flatbuffers::Vector<{entry}>> {f.name};"
+                arguments.append(f.name)
+            elif self.schema.is_struct(f.type):
+                declared[f.name] = f"std::optional<wire::{f.type}> {f.name};"
+                arguments.append(f"{f.name} ? &*{f.name} : nullptr")
+            else:
+                kind = f"wire::{f.type}" if f.type in self.schema.enums else CPP_TYPES[f.type]
+                kind = f"std::optional<{kind}>" if f.default == "null" else kind
+                declared[f.name] = f"{kind} {f.name}{{}};"
+                arguments.append(f.name)
+        lines = list(declared.values())
+        for alternative in self.schema.alternatives(table):
+            lines.append(f"if (const auto* used = std::get_if<{alternative.name}>"
+                         f"(&item.{table.get('variant')})) {{")
+            lines.append(f"  const {alternative.name}& m = *used;")
+            for f in alternative.fields:
+                value = self.wire_scalar(f)
+                condition = self.used_if(f, "m.{}")
+                if f.is_list:
+                    value = f"StructList(b, {self.member(f)}, false)"
+                elif self.schema.is_struct(f.type):
+                    value = f"ToWire({'*' if 'optional' in f else ''}{self.member(f)})"
+                    condition = f"if ({self.member(f)}) " if "optional" in f else condition
+                lines.append(f"  {condition}{f.name} = {value};")
+            lines.append("}")
+        lines.append(f"const {self.type_name(table.name)}& m = item;")
+        lines.append(f"return wire::Create{table.name}({', '.join(arguments)});")
+        return self.function(self.build_signature(table, "item"), lines)
+
     def build_function(self, table):
+        if "variant" in table:
+            return self.variant_build_function(table)
         lines = [self.build_early(f) for f in table.fields if "early" in f]
         lines += [line for f in table.fields if (line := self.build(f))]
         if "in_order" in table:
@@ -209,8 +301,8 @@ class Cpp:
             lines.append(f"return wire::Create{table.name}({arguments});")
         return self.function(self.build_signature(table), lines)
 
-    def build_signature(self, table):
-        argument = f"const {self.type_name(table.name)}& m"
+    def build_signature(self, table, name="m"):
+        argument = f"const {self.type_name(table.name)}& {name}"
         if table.is_struct:
             return f"wire::{table.name} ToWire({argument})"
         return f"Offset<wire::{table.name}> Build(FlatBufferBuilder& b, {argument})"
@@ -284,6 +376,8 @@ class Cpp:
         lines = [f"/// {line}" for line in table.doc] + [f"struct {self.type_name(table.name)} {{"]
         if "message" in table:
             lines.append(f"  static constexpr MessageType kType = MessageType::k{table.name};")
+        if "variant" in table:
+            return "\n".join(lines + self.variant_members(table)) + "\n"
         groups = {}  # Members that several fields share, and how many: legs[0], legs[1].
         for f in table.fields:
             name = re.split(r"[.\[]", f.get("cpp", f.name))[0]
@@ -299,8 +393,23 @@ class Cpp:
             else:
                 type_name = self.member_type(f)
                 lines.append(f"  {type_name} {name}{self.initializer(f, type_name)};")
+        return "\n".join(lines + self.struct_end(table)) + "\n"
+
+    def struct_end(self, table):
         equal = f"bool operator==(const {self.type_name(table.name)}&) const = default;"
-        return "\n".join(lines + [f"  {equal}", "};"]) + "\n"
+        return [f"  {equal}", "};"]
+
+    def variant_members(self, table):
+        lines = []
+        names = ", ".join(alternative.name for alternative in self.schema.alternatives(table))
+        for f in table.fields:
+            if f.name == "type":
+                lines.append(f"  std::variant<{names}> {table.get('variant')};")
+            elif "only" not in f:
+                lines += [f"  /// {line}" for line in f.doc]
+                type_name = self.member_type(f)
+                lines.append(f"  {type_name} {f.name}{self.initializer(f, type_name)};")
+        return lines + self.struct_end(table)
 
     def enum(self, enum):
         lines = [f"/// {line}" for line in enum.doc]
@@ -320,6 +429,8 @@ class Cpp:
             for f in table.fields:
                 if f.type in self.schema.tables:
                     add(self.schema.tables[f.type])
+            if "variant" in table:
+                done.extend(self.schema.alternatives(table))
             done.append(table)
 
         for table in self.schema.tables.values():
@@ -351,6 +462,9 @@ class Cpp:
             if "native" in t:
                 continue
             name = self.type_name(t.name)
+            for alternative in self.schema.alternatives(t) if "variant" in t else []:
+                lines.append("void CheckFields(Findings& found, const FieldPath& at, "
+                             f"const {alternative.name}& m);")
             checks = ["CheckFields", "CheckMeaning"] if "meaning" in t else ["CheckFields"]
             lines += [f"void {check}(Findings& found, const FieldPath& at, const {name}& m);"
                       for check in checks]
@@ -364,10 +478,12 @@ class Cpp:
         for t in self.schema.tables.values():
             if "native" in t:
                 continue
+            if "variant" in t:
+                parts += [self.check_function(each) for each in self.schema.alternatives(t)]
             if not t.by_hand("check"):
                 parts.append(self.check_function(t))
             if not t.by_hand("decode"):
-                parts.append(self.unpack_function(t))
+                parts += self.unpack_functions(t)
             if not t.by_hand("encode"):
                 parts.append(self.to_wire_function(t) if t.is_struct else self.build_function(t))
         return (self.head() + '#include "codec_support.h"\n\nnamespace stridewire::protocol {\n\n' +

@@ -15,6 +15,8 @@ class CppJson(Cpp):
         if "json_omit" not in f:
             return ""
         m = f"m.{f.get('json_omit')}" if f.get("json_omit") else self.member(f)
+        if "inverted" in f:
+            return f"if (!{m}) "
         if f.is_list:
             return f"if (!{m}.empty()) "
         if f.type in self.schema.enums:
@@ -29,10 +31,17 @@ class CppJson(Cpp):
         return fields
 
     def json_function(self, table):
-        fields = self.ordered(table)
         signature = f"Json Fields(const {self.type_name(table.name)}& m)"
         lines = ["Json json = Json::object();"]
-        lines += [f'{self.condition(f)}json["{f.name}"] = {self.value(f)};' for f in fields]
+        for f in self.ordered(table):
+            condition = self.used_if(f, "m.{}") + self.condition(f)
+            if "variant" in table and f.name == "type":
+                lines.append(f'json["type"] = {self.variant(table)}.index();')
+            elif "variant" not in table or "only" not in f:
+                lines.append(f'{condition}json["{f.name}"] = {self.value(f)};')
+        if "variant" in table:
+            lines.append("std::visit([&](const auto& used) { json.update(Fields(used)); }, "
+                         f"{self.variant(table)});")
         return self.function(signature, lines + ["return json;"])
 
     def parse(self, f):
@@ -42,20 +51,30 @@ class CppJson(Cpp):
             return [f'json.at("{f.name}").at({i}).get_to({m}.{part.name});'
                     for i, part in enumerate(parts)]
         if "inverted" in f:
-            return [f'if (json.contains("{f.name}")) {m} = !json.at("{f.name}").get<bool>();']
+            return [f'{self.used_if(f, "m.{}")}{m} = !json.value("{f.name}", false);']
         return [f'Get(json, "{f.name}", {m});']
 
     def parse_function(self, table):
         signature = f"void FromJson(const Json& json, {self.type_name(table.name)}& m)"
-        return self.function(signature, [line for f in table.fields for line in self.parse(f)])
+        fields = self.common_fields(table) if "variant" in table else table.fields
+        lines = [line for f in fields for line in self.parse(f)]
+        if "variant" in table:
+            lines.append('switch (json.at("type").get<int>()) {')
+            for number, each in enumerate(self.schema.alternatives(table)):
+                target = f"{self.variant(table)}.emplace<{each.name}>()"
+                lines.append(f"  case {number}: FromJson(json, {target}); break;")
+            lines.append("}")
+        return self.function(signature, lines)
 
     def is_alone(self, table):
         return self.member(table.fields[0]) == "m"
 
     @property
     def objects(self):
-        return [t for t in self.schema.tables.values()
-                if "native" not in t and not self.is_alone(t)]
+        """The tables with an object in JSON, each after its alternatives."""
+        return [each for t in self.schema.tables.values()
+                if "native" not in t and not self.is_alone(t)
+                for each in (self.schema.alternatives(t) if "variant" in t else []) + [t]]
 
     def header(self):
         declarations = "".join(f"[[nodiscard]] Json Fields(const {self.type_name(t.name)}& m);\n"

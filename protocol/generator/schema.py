@@ -5,19 +5,20 @@ attributes itself, because flatc accepts every declared attribute anywhere.
 """
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 # Sizes in bytes.
 SCALARS = {"bool": 1, "byte": 1, "ubyte": 1, "short": 2, "ushort": 2, "int": 4, "uint": 4,
            "float": 4, "long": 8, "ulong": 8, "double": 8}
 
 TABLE_ATTRIBUTES = {
-    "bulk", "cpp", "handwritten", "in_order", "meaning", "message", "native", "sender",
+    "bulk", "cpp", "handwritten", "in_order", "meaning", "message", "native", "sender", "variant",
 }
 FIELD_ATTRIBUTES = {
     "above", "below", "bytes", "cpp", "deprecated", "early", "enumerators", "group",
     "initial", "inverted", "json_array", "json_omit", "json_place", "keep_empty", "max", "min",
-    "nonzero", "number", "omit_zero", "only", "optional", "shared", "status", "web",
+    "needed", "nonzero", "number", "omit_zero", "only", "optional", "shared", "status", "web",
+    "with", "without",
 }
 ENUM_ATTRIBUTES = {"cpp", "handwritten"}
 
@@ -119,6 +120,27 @@ class Schema:
             align = max(align, part_align)
         return -(-size // align) * align, align
 
+    def alternatives(self, table):
+        """The alternatives of a table with the attribute `variant`: for each value of its field
+        `type` a table with the fields that the value uses."""
+        enum = self.enums[next(f.type for f in table.fields if f.name == "type")]
+        tables = []
+        for value in enum.values:
+            fields = [f for f in table.fields if value in f.get("only", "").split()]
+            names = [f.name for f in fields]
+            tables.append(Table(value + table.get("variant").capitalize(), False, {}, table.line,
+                                enum.value_docs[value],
+                                [self._used_by(f, value, names) for f in fields]))
+        return tables
+
+    def _used_by(self, f, value, names):
+        """The field as the value uses it: without conditions on fields that it does not use."""
+        needed = value in f.get("needed", "").split()
+        attributes = {name: text for name, text in f.attributes.items()
+                      if not (needed and name in ("json_omit", "optional", "with", "without"))
+                      and not (name in ("with", "without") and text not in names)}
+        return replace(f, default=None if needed else f.default, attributes=attributes)
+
     # ---- parsing
 
     def _parse(self, text):
@@ -201,6 +223,9 @@ class Schema:
         for table in self.tables.values():
             for f in table.all_fields:
                 self._check_field(f, f"{table.name}.{f.name}")
+                for other in (f.get("with"), f.get("without")):
+                    if other is not None and other not in [each.name for each in table.fields]:
+                        self.fail(f.line, f"{table.name}.{f.name}: there is no field '{other}'")
 
     def _check_field(self, f, where):
         is_object = f.type in self.tables

@@ -58,6 +58,12 @@ void CheckMeaning(Findings& found, const FieldPath& at, const Welcome& m) {
   CheckResumeToken(found, at, m.resume_token);
 }
 
+void CheckMeaning(Findings& found, const FieldPath& at, const RequestItem& m) {
+  const auto* step = std::get_if<StepMovement>(&m.movement);
+  found.That(step == nullptr || !step->exact_only || !step->allow_nearest, ErrorCode::kMalformed,
+             "exact_only excludes allow_nearest", At(at, "exact_only"));
+}
+
 void CheckMeaning(Findings& found, const FieldPath& at, const Observe& m) {
   found.That(m.region || !m.replace, ErrorCode::kMalformed, "replace requires a region",
              At(at, "replace"));

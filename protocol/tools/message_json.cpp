@@ -6,7 +6,6 @@
 #include "base/check.h"
 #include "json_support.h"
 #include "message_list.h"
-#include "request_fields.h"
 #include "sample_messages.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
@@ -30,39 +29,6 @@ Json Fields(const RotationQuantization& m) {
           {"bits", m.bits},
           {"smallest_three_bits", m.smallest_three_bits},
           {"least_w", m.least_w}};
-}
-
-Json Fields(const RequestItem& m) {
-  Json json = Json::object();
-  VisitRequest(m, [&](const char* name, const auto& value) { json[name] = Value(value); });
-  const auto* step = std::get_if<StepMovement>(&m.movement);
-  const auto* jump = std::get_if<JumpMovement>(&m.movement);
-  // Vectors that are older than these fields do not contain them.
-  if (step != nullptr && !step->at && !step->exact_only) json.erase("exact_only");
-  if ((step != nullptr && !step->allow_nearest && !step->exact_only) ||
-      (jump != nullptr && !jump->allow_nearest)) {
-    json["must_be_near"] = true;
-  }
-  return json;
-}
-
-void FromJson(const Json& json, RequestItem& m) {
-  const auto type = json.at("type").get<MovementType>();
-  if (type == MovementType::kJump) m.movement = JumpMovement{};
-  if (type == MovementType::kStand) m.movement = StandMovement{};
-  if (type == MovementType::kWalk) m.movement = WalkMovement{};
-  if (type == MovementType::kStep && json.contains("at_m")) {
-    m.movement = StepMovement{.at = Footprint{}};
-  }
-  VisitRequest(m, [&]<typename T>(const char* name, T& value) {
-    if constexpr (!std::is_const_v<T>) Get(json, name, value);
-  });
-  const bool must_be_near = json.value("must_be_near", false);
-  if (auto* step = std::get_if<StepMovement>(&m.movement)) {
-    step->allow_nearest = !step->exact_only && !must_be_near;
-  } else if (auto* jump = std::get_if<JumpMovement>(&m.movement)) {
-    jump->allow_nearest = !must_be_near;
-  }
 }
 
 Json Value(const ParameterSet& set) {

@@ -91,9 +91,7 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
           step.side_m = movement.side_m;
           step.height_m = movement.height_m;
           step.turn_rad = movement.turn_rad;
-          if (movement.at) {
-            step.at = FootprintRequest{movement.at->position_m, movement.at->heading_rad};
-          }
+          if (movement.at_m) step.at = FootprintRequest{*movement.at_m, movement.heading_rad};
           step.exact_only = movement.exact_only;
           step.allow_nearest = movement.allow_nearest;
           request.movement = step;
@@ -101,8 +99,8 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
           request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad,
                                          movement.allow_nearest};
         } else if constexpr (std::is_same_v<T, protocol::WalkMovement>) {
-          request.movement = WalkRequest{movement.position_m, movement.heading_rad,
-                                         movement.waypoints_m, movement.speed_m_s};
+          request.movement = WalkRequest{movement.at_m, movement.heading_rad, movement.waypoints_m,
+                                         movement.speed_m_s};
         } else {
           request.movement = StandRequest{movement.seconds};
         }
@@ -128,8 +126,8 @@ protocol::RequestItem ToWire(const MovementRequest& request) {
           step.height_m = movement.height_m;
           step.turn_rad = movement.turn_rad;
           if (movement.at) {
-            step = {.foot = step.foot,
-                    .at = protocol::Footprint{movement.at->position_m, movement.at->heading_rad}};
+            step.at_m = movement.at->position_m;
+            step.heading_rad = movement.at->heading_rad;
           }
           step.exact_only = movement.exact_only;
           step.allow_nearest = movement.allow_nearest;

@@ -782,10 +782,9 @@ TEST_F(ServerSessionOfOne, InterruptsMovements) {
 }
 
 TEST_F(ServerSessionOfOne, ReachesOrRejectsExactFootprints) {
-  protocol::StepMovement far{.at = protocol::Footprint{DVec3(0.1, 0.0, 5.0), 0.0},
-                             .exact_only = true};
+  protocol::StepMovement far{.at_m = DVec3(0.1, 0.0, 5.0), .heading_rad = 0.0, .exact_only = true};
   protocol::StepMovement near = far;
-  near.at->position_m.z = 0.45;
+  near.at_m->z = 0.45;
   ASSERT_TRUE(client_.Request(world_, {{1, 7, far}, {1, 8, near}}));
   std::vector<protocol::Event> heard;
   while (heard.empty() || heard.back().type != protocol::EventType::kFinished) {
@@ -834,12 +833,11 @@ TEST_F(ServerSessionOfOne, RejectsStepsAndJumpsOutOfReachUnlessTheNearestIsAllow
     }
     return heard;
   };
-  const auto rejected =
-      hear({{1, 7, StepMovement{.length_m = 2.0}},
-            {1, 8, JumpMovement{.length_m = 4.0}},
-            {1, 9, StepMovement{.length_m = 1.3, .exact_only = true}},
-            {1, 10, StepMovement{.at = protocol::Footprint{DVec3(0.0, 0.0, 3.0), std::nullopt}}}},
-           10);
+  const auto rejected = hear({{1, 7, StepMovement{.length_m = 2.0}},
+                              {1, 8, JumpMovement{.length_m = 4.0}},
+                              {1, 9, StepMovement{.length_m = 1.3, .exact_only = true}},
+                              {1, 10, StepMovement{.at_m = DVec3(0.0, 0.0, 3.0)}}},
+                             10);
   ASSERT_EQ(rejected.size(), 4u);
   for (std::size_t i = 0; i < 4; ++i) {
     SCOPED_TRACE(i);
@@ -1009,7 +1007,8 @@ TEST(ServerSession, SetsPlanting) {
   EXPECT_FALSE(is_enabled(3));
 
   const protocol::StepMovement must{.foot = protocol::FootChoice::kLeft,
-                                    .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0},
+                                    .at_m = DVec3(0.1, 0.0, 0.3),
+                                    .heading_rad = 0.0,
                                     .exact_only = true};
   const auto sliding = client.Request(world->world, {{1, 7, must}, {2, 8, must}});
   ASSERT_TRUE(sliding);
@@ -1026,8 +1025,8 @@ TEST(ServerSession, SetsPlanting) {
 }
 
 TEST_F(ServerSessionOfOne, StepsToAFootprint) {
-  const protocol::StepMovement step{.foot = protocol::FootChoice::kLeft,
-                                    .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0}};
+  const protocol::StepMovement step{
+      .foot = protocol::FootChoice::kLeft, .at_m = DVec3(0.1, 0.0, 0.3), .heading_rad = 0.0};
   const auto reply = client_.Request(world_, {{1, 7, step}});
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->accepted, 1u) << (reply->items.empty() ? "" : reply->items[0].text);

@@ -439,7 +439,7 @@ TEST_F(SessionTest, SendsTerrainFootprintsAndWalks) {
   EXPECT_EQ(session_->SetTerrain(world, {0, 0, Slab(0.25)}, command_), STRIDEWIRE_OK);
   protocol::Request request = StepOf(1, 9);
   request.items[0].movement =
-      protocol::StepMovement{.at = protocol::Footprint{DVec3(1.0, 0.25, -2.0), 0.5}};
+      protocol::StepMovement{.at_m = DVec3(1.0, 0.25, -2.0), .heading_rad = 0.5};
   EXPECT_EQ(session_->Request(world, request, command_), STRIDEWIRE_OK);
   const auto sent = Sent();
   ASSERT_EQ(sent.size(), 2u);
@@ -462,8 +462,8 @@ TEST_F(SessionTest, SendsTerrainFootprintsAndWalks) {
 
 TEST_F(SessionTest, SendsExactFootprints) {
   protocol::Request request = StepOf(1, 9);
-  protocol::StepMovement step{.at = protocol::Footprint{DVec3(1.0, 0.25, -2.0), 0.5},
-                              .exact_only = true};
+  protocol::StepMovement step{
+      .at_m = DVec3(1.0, 0.25, -2.0), .heading_rad = 0.5, .exact_only = true};
   request.items[0].movement = step;
   const stridewire_world world = Joined();
   EXPECT_EQ(session_->Request(world, request, command_), STRIDEWIRE_OK);

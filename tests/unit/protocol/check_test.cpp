@@ -523,10 +523,10 @@ TEST(Check, AvatarState) {
 }
 
 TEST(Check, ExactOnlyExcludesAllowNearest) {
-  Request message{1, 1, {{1, 1, StepMovement{.at = Footprint{}, .exact_only = true}}}};
+  Request message{1, 1, {{1, 1, StepMovement{.at_m = DVec3(0.0), .exact_only = true}}}};
   EXPECT_TRUE(Check(message).has_value());
   auto& step = std::get<StepMovement>(message.items[0].movement);
-  step.at.reset();
+  step.at_m.reset();
   EXPECT_TRUE(Check(message).has_value());
   step.allow_nearest = true;
   const Status status = Check(message);
@@ -540,14 +540,15 @@ TEST(Check, ExactOnlyExcludesAllowNearest) {
 
 TEST(Check, Footprints) {
   Request good = GoodRequest();
-  good.items[0].movement = StepMovement{.at = Footprint{DVec3(1.0, 2.0, 3.0), 0.5}};
-  const auto at = [](Request& m) -> Footprint& {
-    return *std::get<StepMovement>(m.items[0].movement).at;
+  good.items[0].movement = StepMovement{.at_m = DVec3(1.0, 2.0, 3.0), .heading_rad = 0.5};
+  const auto step = [](Request& m) -> StepMovement& {
+    return std::get<StepMovement>(m.items[0].movement);
   };
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return at(m).position_m.z; }, "Request.items.at_m");
+      good, [&](Request& m) -> double& { return step(m).at_m->z; }, "Request.items.at_m");
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return *at(m).heading_rad; }, "Request.items.heading_rad");
+      good, [&](Request& m) -> double& { return *step(m).heading_rad; },
+      "Request.items.heading_rad");
 }
 
 TEST(Check, Walks) {
@@ -557,7 +558,7 @@ TEST(Check, Walks) {
     return std::get<WalkMovement>(m.items[0].movement);
   };
   RefusedWhenNotFinite<Request>(
-      good, [&](Request& m) -> double& { return walk(m).position_m.z; }, "Request.items.at_m");
+      good, [&](Request& m) -> double& { return walk(m).at_m.z; }, "Request.items.at_m");
   RefusedWhenNotFinite<Request>(
       good, [&](Request& m) -> double& { return walk(m).heading_rad; },
       "Request.items.heading_rad");

@@ -83,6 +83,7 @@ class SchemaTest(unittest.TestCase):
             "union U { A, B }": "small.fbs:1: expected a table, struct or enum, got 'union U'",
             "table A {\n  x: [string] (max: \"2\");\n}": "small.fbs:2: A.x: lists of strings",
             "table A {\n  x: uint;": "small.fbs:2: the declaration does not end",
+            "table A {\n  x: uint (with: \"y\");\n}": "small.fbs:2: A.x: there is no field 'y'",
         }
         for text, expected in cases.items():
             with self.subTest(text), self.assertRaises(SchemaError) as raised:
@@ -132,9 +133,57 @@ class CppTest(unittest.TestCase):
         source = CppJson(read(SMALL)).source()
         self.assertIn('json["seq"] = Value(m.seq);', source)
         self.assertIn('json["hidden"] = !m.visible;', source)
-        self.assertIn('if (json.contains("hidden")) m.visible = !json.at("hidden").get<bool>();',
-                      source)
+        self.assertIn('m.visible = !json.value("hidden", false);', source)
         self.assertIn('Get(json, "speed_m_s", m.speed_m_s);', source)
+
+
+VARIANT = """
+struct Vec3 (native: "DVec3") { x: double; y: double; z: double; }
+enum Kind: ubyte {
+  /// A hop.
+  Hop = 0,
+  Run = 1
+}
+table Item (variant: "movement") {
+  id: uint (nonzero);
+  type: Kind;
+  far: double (only: "Hop Run", without: "at");
+  at: Vec3 (optional, only: "Run", json_omit);
+  high: bool (only: "Hop", json_omit);
+  seconds: double = null (only: "Run", needed: "Run");
+}
+table Ask (message: "7", sender: "client") { items: [Item] (max: "4"); }
+"""
+
+
+class VariantTest(unittest.TestCase):
+    def test_writes_a_struct_per_type(self):
+        header = Cpp(read(VARIANT)).structs_header()
+        self.assertIn("/// A hop.\nstruct HopMovement {\n  double far = 0.0;\n"
+                      "  bool high = false;\n", header)
+        self.assertIn("struct RunMovement {\n  double far = 0.0;\n  std::optional<DVec3> at;\n"
+                      "  double seconds = 0.0;\n", header)
+        self.assertIn("struct Item {\n  std::uint32_t id = 0;\n"
+                      "  std::variant<HopMovement, RunMovement> movement;\n", header)
+
+    def test_copies_only_fields_that_the_type_uses(self):
+        source = Cpp(read(VARIANT)).codec_source()
+        for line in ("  if (!m.at) found.Finite(m.far, At(at, \"far\"));",
+                     "  if (!w.at()) m.far = w.far();", "  m.high = w.high();",
+                     "    case wire::Kind::Run: return Unpack(u, at, w, "
+                     "m.movement.emplace<RunMovement>());",
+                     "  if (!w.seconds()) {\n"
+                     "    return u.Wrong(ErrorCode::kMalformed, \"a run requires seconds\", ",
+                     "  m.seconds = *w.seconds();", "    if (!m.at) far = m.far;",
+                     "    if (m.at) at = ToWire(*m.at);"):
+            self.assertIn(line, source)
+
+    def test_writes_json_of_the_used_fields(self):
+        source = CppJson(read(VARIANT)).source()
+        self.assertIn('  if (!m.at) json["far"] = Value(m.far);\n'
+                      '  if (m.at) json["at"] = Value(m.at);\n', source)
+        self.assertIn("    case 1: FromJson(json, m.movement.emplace<RunMovement>()); break;",
+                      source)
 
 
 class TypeScriptTest(unittest.TestCase):

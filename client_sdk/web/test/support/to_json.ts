@@ -32,7 +32,7 @@ function request(item: QueuedRequest): Json {
       if (item.atM !== null) {
         return {
           ...common, foot: enums.FootChoice.indexOf(item.foot), at_m: vec3(item.atM),
-          heading_rad: item.headingRad, exact_only: item.exactOnly, ...near,
+          heading_rad: item.headingRad, ...(item.exactOnly ? {exact_only: true} : {}), ...near,
         };
       }
       return {

@@ -17,8 +17,8 @@
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/status_code.h"
 
-/// Structs of messages that the build does not generate, because requested movements are a variant,
-/// and batches and movement records have member functions. Include messages.h instead.
+/// Structs of messages that the build does not generate, because several messages contain them, or
+/// they have member functions. Include messages.h instead.
 namespace stridewire::protocol {
 
 using WorldId = std::uint32_t;   ///< Assigned by the server, never 0.
@@ -35,68 +35,6 @@ struct Placement {
   DVec3 position_m = DVec3(0.0);
   double heading_rad = 0.0;  ///< Rotation about +Y, positive to the left, not wrapped.
   bool operator==(const Placement&) const = default;
-};
-
-/// Target of a foot in the world.
-struct Footprint {
-  DVec3 position_m = DVec3(0.0);      ///< Position of the ball of the foot.
-  std::optional<double> heading_rad;  ///< Heading of the foot. Absent: the server chooses it.
-  bool operator==(const Footprint&) const = default;
-};
-
-/// A requested step, either by parameters or to a footprint.
-struct StepMovement {
-  FootChoice foot = FootChoice::kAuto;
-  double length_m = 0.0;  ///< Forward distance between the feet at the end.
-  /// Sideways distance from the fixed to the moving foot, positive towards the moving foot's side.
-  std::optional<double> side_m;
-  double height_m = 0.0;  ///< Height of the moving foot above the fixed foot at the end.
-  double turn_rad = 0.0;  ///< Change of heading.
-  /// Target of the foot. If present, length, side, height and turn are not encoded.
-  std::optional<Footprint> at;
-  /// True: if the foot cannot land exactly at its place when the step is about to start, the step
-  /// is rejected.
-  bool exact_only = false;
-  /// False: if the step is out of reach when it is about to start (STANDARD.md, "Request"), it is
-  /// rejected. True: the server plays the nearest one instead. On the wire, the field
-  /// `must_be_near` is the opposite. Excludes `exact_only`.
-  bool allow_nearest = false;
-  bool operator==(const StepMovement&) const = default;
-};
-
-/// A requested jump with both feet.
-struct JumpMovement {
-  double length_m = 0.0;
-  double height_m = 0.0;
-  double turn_rad = 0.0;
-  bool allow_nearest = false;  ///< As in StepMovement.
-  bool operator==(const JumpMovement&) const = default;
-};
-
-/// A request to stand.
-struct StandMovement {
-  double seconds = 0.0;  ///< Duration.
-  bool operator==(const StandMovement&) const = default;
-};
-
-/// A request to walk to a position. Events of its steps carry its request id. The walk ends with a
-/// finished stand of that id when the avatar has arrived, or with a rejected event.
-struct WalkMovement {
-  DVec3 position_m = DVec3(0.0);   ///< Destination of the base frame. The terrain gives its height.
-  double heading_rad = 0.0;        ///< Heading of the base frame at the destination.
-  std::vector<DVec3> waypoints_m;  ///< Positions to pass, in this order; at most kMaxWaypoints.
-  std::optional<double> speed_m_s;  ///< Walking speed. Absent: the server chooses it.
-  bool operator==(const WalkMovement&) const = default;
-};
-
-/// One requested movement of one avatar.
-struct RequestItem {
-  AvatarId avatar = 0;  ///< Not 0.
-  /// Id that the client chooses, not 0. Events of the request contain it.
-  RequestId request_id = 0;
-  std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
-  Interrupt interrupt = Interrupt::kNone;
-  bool operator==(const RequestItem&) const = default;
 };
 
 /// The step or jump in reach that is nearest to a rejected one. The foot of a step, or the middle
