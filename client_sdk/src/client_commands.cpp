@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "client/request_from_c.h"
 #include "client_handle.h"
 
 using stridewire::DVec3;
@@ -21,16 +22,6 @@ bool IsList(const void* items, std::size_t count) {
   return items != nullptr && count >= 1 && count <= STRIDEWIRE_MAX_ITEMS;
 }
 
-bool IsMovement(const stridewire_movement& m) {
-  return InRange(m.type, STRIDEWIRE_STEP, STRIDEWIRE_WALK) &&
-         InRange(m.foot, STRIDEWIRE_FOOT_AUTO, STRIDEWIRE_FOOT_RIGHT) &&
-         InRange(m.interrupt, STRIDEWIRE_QUEUED, STRIDEWIRE_NOW) &&
-         m.waypoint_count <= STRIDEWIRE_MAX_WAYPOINTS &&
-         (m.type != STRIDEWIRE_WALK || m.waypoint_count == 0 || m.waypoints_m != nullptr) &&
-         (m.exact_only == 0 || (m.type == STRIDEWIRE_STEP && m.allow_nearest == 0)) &&
-         (m.allow_nearest == 0 || m.type == STRIDEWIRE_STEP || m.type == STRIDEWIRE_JUMP);
-}
-
 protocol::Spawn ToSpawn(std::span<const stridewire_spawn> spawns, bool teleport) {
   protocol::Spawn message;
   message.items.reserve(spawns.size());
@@ -41,43 +32,6 @@ protocol::Spawn ToSpawn(std::span<const stridewire_spawn> spawns, bool teleport)
          teleport});
   }
   return message;
-}
-
-decltype(protocol::RequestItem::movement) ToMovement(const stridewire_movement& m) {
-  switch (m.type) {
-    case STRIDEWIRE_STEP: {
-      protocol::StepMovement step;
-      step.foot = static_cast<protocol::FootChoice>(m.foot);
-      step.exact_only = m.exact_only != 0;
-      step.allow_nearest = m.allow_nearest != 0;
-      if (m.has_at != 0) {
-        step.at_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
-        if (m.has_heading != 0) step.heading_rad = m.heading_rad;
-        return step;
-      }
-      step.length_m = m.length_m;
-      if (m.has_side != 0) step.side_m = m.side_m;
-      step.height_m = m.height_m;
-      step.turn_rad = m.turn_rad;
-      return step;
-    }
-    case STRIDEWIRE_JUMP:
-      return protocol::JumpMovement{m.length_m, m.height_m, m.turn_rad, m.allow_nearest != 0};
-    case STRIDEWIRE_STAND: return protocol::StandMovement{m.seconds};
-    case STRIDEWIRE_WALK: {
-      protocol::WalkMovement walk;
-      walk.at_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
-      walk.heading_rad = m.heading_rad;
-      for (std::size_t w = 0; w < m.waypoint_count; ++w) {
-        const double* waypoint_m = m.waypoints_m + 3 * w;
-        walk.waypoints_m.emplace_back(waypoint_m[0], waypoint_m[1], waypoint_m[2]);
-      }
-      if (m.has_speed != 0) walk.speed_m_s = m.speed_m_s;
-      return walk;
-    }
-    case STRIDEWIRE_MOVEMENT_TYPE_MAX: break;
-  }
-  return {};  // Unreachable: IsMovement has checked the type.
 }
 
 bool IsTerrain(const stridewire_terrain_def& terrain) {
@@ -206,13 +160,14 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
                                             const stridewire_movement* movements, size_t count,
                                             uint64_t* command) {
   if (!IsList(movements, count)) return STRIDEWIRE_INVALID_ARGUMENT;
-  if (!std::all_of(movements, movements + count, IsMovement)) return STRIDEWIRE_INVALID_ARGUMENT;
+  if (!std::all_of(movements, movements + count, protocol::IsMovement)) {
+    return STRIDEWIRE_INVALID_ARGUMENT;
+  }
   return Submit(client, command, [&](Session& session, std::uint64_t& id) {
     protocol::Request message;
     message.items.reserve(count);
     for (const stridewire_movement& m : std::span(movements, count)) {
-      message.items.push_back(
-          {m.avatar, m.request_id, ToMovement(m), static_cast<protocol::Interrupt>(m.interrupt)});
+      message.items.push_back(protocol::ToRequestItem(m));
     }
     return session.Request(world, std::move(message), id);
   });

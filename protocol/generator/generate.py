@@ -2,9 +2,10 @@
 """Generates code from the schema of the protocol: generate.py SCHEMA KIND FOLDER.
 
 KIND is one of:
-  cpp   limits.h, message_type.h, message_structs.h, message_list.h, codec.h and codec.cpp
-  json  fields_json.h and fields_json.cpp, for the test vectors
-  web   messages.ts and tables.ts, for the web client
+  cpp     limits.h, message_type.h, message_structs.h, message_list.h, codec.h and codec.cpp
+  client  client/request_from_c.h, for the C API of the client
+  json    fields_json.h and fields_json.cpp, for the test vectors
+  web     messages.ts and tables.ts, for the web client
 
 Files that would not change are left alone, so that nothing is compiled again.
 """
@@ -12,6 +13,7 @@ Files that would not change are left alone, so that nothing is compiled again.
 import pathlib
 import sys
 
+from c_api import CApi
 from cpp import Cpp
 from cpp_json import CppJson
 from schema import Schema, SchemaError
@@ -30,6 +32,8 @@ def files(schema, kind):
     if kind == "json":
         json = CppJson(schema)
         return {"fields_json.h": json.header(), "fields_json.cpp": json.source()}
+    if kind == "client":
+        return {"client/request_from_c.h": CApi(schema).header()}
     if kind == "web":
         web = TypeScript(schema)
         return {"messages.ts": web.messages(), "tables.ts": web.tables()}
