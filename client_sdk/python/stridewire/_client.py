@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 
 from . import _abi, _load
-from ._types import (Event, EventType, Foot, Interrupt, Kind, Outcome, Playout, Pose, PoseKind,
-                     PoseMode, Recording, Skeleton, StridewireError)
+from ._requests import Requests
+from ._types import (Event, EventType, Foot, Kind, Outcome, Playout, Pose, PoseKind, PoseMode,
+                     Recording, Skeleton, StridewireError, Vec3, point)
 
 _library = _load.load()
-_STEP, _JUMP, _STAND, _WALK = range(4)
 _NO_TICK = 2**64 - 1
 _BUFFER_TOO_SMALL = 150
 _TIMEOUT = 300
-
-Vec3 = Sequence[float]
 
 
 def version() -> str:
@@ -35,14 +33,6 @@ def _name(status: int) -> str:
 def _check(status: int) -> None:
     if status != 0:
         raise StridewireError(_name(status), _library.stridewire_status_text(status).decode())
-
-
-def _point(position_m: Vec3) -> tuple[float, ...]:
-    # ctypes would fill a shorter sequence with zeros.
-    point = tuple(position_m)
-    if len(point) != 3:
-        raise ValueError(f"expected a position of 3 numbers (x, y, z), got {len(point)}")
-    return point
 
 
 def _address(text: str) -> _abi.stridewire_address:
@@ -228,7 +218,7 @@ class Client:
         return items
 
 
-class World:
+class World(Requests):
     """A joined world. Its commands wait for the reply of the server, and raise StridewireError if
     an item was refused; the other items were executed."""
 
@@ -269,13 +259,13 @@ class World:
     def spawn(self, position_m: Vec3 = (0.0, 0.0, 0.0), heading_rad: float = 0.0,
               avatar: int = 0) -> int:
         """Spawns an avatar and returns its id. With `avatar` 0 the server chooses the id."""
-        spawn = _abi.stridewire_spawn(avatar, _point(position_m), heading_rad)
+        spawn = _abi.stridewire_spawn(avatar, point(position_m), heading_rad)
         items = self._command(_library.stridewire_client_spawn, c.byref(spawn), 1)
         return items[0].avatar if items else avatar
 
     def teleport(self, avatar: int, position_m: Vec3, heading_rad: float = 0.0) -> None:
         """Moves an avatar at once. It drops its requests and stands."""
-        place = _abi.stridewire_spawn(avatar, _point(position_m), heading_rad)
+        place = _abi.stridewire_spawn(avatar, point(position_m), heading_rad)
         self._command(_library.stridewire_client_teleport, c.byref(place), 1)
 
     def remove(self, *avatars: int) -> None:
@@ -291,50 +281,6 @@ class World:
                 c.byref(count)) == _BUFFER_TOO_SMALL:
             ids = (c.c_uint32 * count.value)()
         return list(ids[:count.value])
-
-    # Requests. Each returns the id of the request, for wait().
-
-    def step(self, avatar: int, length_m: float = 0.0, *, side_m: float | None = None,
-             height_m: float = 0.0, turn_rad: float = 0.0, at_m: Vec3 | None = None,
-             heading_rad: float | None = None, foot: Foot = Foot.AUTO, exact_only: bool = False,
-             allow_nearest: bool = False, interrupt: Interrupt = Interrupt.QUEUED) -> int:
-        """Requests a step by length, or to the place `at_m` for the ball of the foot."""
-        m = _abi.stridewire_movement(avatar=avatar, type=_STEP, foot=foot, length_m=length_m,
-                                     height_m=height_m, turn_rad=turn_rad, interrupt=interrupt,
-                                     exact_only=exact_only, allow_nearest=allow_nearest)
-        if side_m is not None:
-            m.has_side, m.side_m = 1, side_m
-        if at_m is not None:
-            m.has_at, m.at_m = 1, _point(at_m)
-            if heading_rad is not None:
-                m.has_heading, m.heading_rad = 1, heading_rad
-        return self._request(m)
-
-    def walk_to(self, avatar: int, at_m: Vec3, heading_rad: float = 0.0, *,
-                waypoints_m: Sequence[Vec3] = (), speed_m_s: float | None = None,
-                interrupt: Interrupt = Interrupt.QUEUED) -> int:
-        """Requests a walk to a place and heading."""
-        m = _abi.stridewire_movement(avatar=avatar, type=_WALK, at_m=_point(at_m),
-                                     heading_rad=heading_rad, interrupt=interrupt)
-        numbers = [number for point in waypoints_m for number in _point(point)]
-        m.waypoints_m = (c.c_double * len(numbers))(*numbers)
-        m.waypoint_count = len(waypoints_m)
-        if speed_m_s is not None:
-            m.has_speed, m.speed_m_s = 1, speed_m_s
-        return self._request(m)
-
-    def jump(self, avatar: int, length_m: float, *, height_m: float = 0.0, turn_rad: float = 0.0,
-             allow_nearest: bool = False, interrupt: Interrupt = Interrupt.QUEUED) -> int:
-        """Requests a jump."""
-        return self._request(_abi.stridewire_movement(
-            avatar=avatar, type=_JUMP, length_m=length_m, height_m=height_m, turn_rad=turn_rad,
-            allow_nearest=allow_nearest, interrupt=interrupt))
-
-    def stand(self, avatar: int, seconds: float, *,
-              interrupt: Interrupt = Interrupt.QUEUED) -> int:
-        """Requests to stand for a time."""
-        return self._request(_abi.stridewire_movement(avatar=avatar, type=_STAND, seconds=seconds,
-                                                      interrupt=interrupt))
 
     def _request(self, movement: _abi.stridewire_movement) -> int:
         request_id = self.client._next_request_id

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+Vec3 = Sequence[float]
+
+
+def point(position_m: Vec3) -> tuple[float, ...]:
+    """Returns the three numbers of a position, which ctypes would fill up with zeros."""
+    numbers = tuple(position_m)
+    if len(numbers) != 3:
+        raise ValueError(f"expected a position of 3 numbers (x, y, z), got {len(numbers)}")
+    return numbers
 
 
 class EventType(enum.IntEnum):

@@ -5,7 +5,7 @@ namespace Stridewire
     /// <summary>A joined world. Each command returns its number. Events that it causes contain this
     /// number as Event.Command. Each request of a movement returns its id, which events of the
     /// movement contain as Event.RequestId.</summary>
-    public sealed unsafe class World
+    public sealed unsafe partial class World
     {
         private readonly Client client;
 
@@ -93,81 +93,6 @@ namespace Stridewire
                     client.Handle, Id, &native, (UIntPtr)1, &command));
             }
             return command;
-        }
-
-        // Requests.
-
-        /// <summary>Requests a step by length: the forward distance between the feet at its end.
-        /// </summary>
-        public ulong Step(uint avatar, double lengthM, Foot foot = Foot.Auto, double? sideM = null,
-                          double heightM = 0.0, double turnRad = 0.0, bool exactOnly = false,
-                          bool allowNearest = false, Interrupt interrupt = Interrupt.Queued)
-        {
-            stridewire_movement m = MakeMovement(avatar, MovementType.Step, interrupt);
-            m.foot = foot;
-            m.length_m = lengthM;
-            m.has_side = Client.ToByte(sideM.HasValue);
-            m.side_m = sideM.GetValueOrDefault();
-            m.height_m = heightM;
-            m.turn_rad = turnRad;
-            m.exact_only = Client.ToByte(exactOnly);
-            m.allow_nearest = Client.ToByte(allowNearest);
-            return Request(ref m);
-        }
-
-        /// <summary>Requests a step that places the ball of the foot at a position.</summary>
-        public ulong StepTo(uint avatar, Position at, Foot foot = Foot.Auto,
-                            double? headingRad = null, bool exactOnly = false,
-                            bool allowNearest = false, Interrupt interrupt = Interrupt.Queued)
-        {
-            stridewire_movement m = MakeMovement(avatar, MovementType.Step, interrupt);
-            m.foot = foot;
-            m.has_at = 1;
-            Write(at, m.at_m);
-            m.has_heading = Client.ToByte(headingRad.HasValue);
-            m.heading_rad = headingRad.GetValueOrDefault();
-            m.exact_only = Client.ToByte(exactOnly);
-            m.allow_nearest = Client.ToByte(allowNearest);
-            return Request(ref m);
-        }
-
-        /// <summary>Requests a jump with both feet.</summary>
-        public ulong Jump(uint avatar, double lengthM, double heightM = 0.0, double turnRad = 0.0,
-                          bool allowNearest = false, Interrupt interrupt = Interrupt.Queued)
-        {
-            stridewire_movement m = MakeMovement(avatar, MovementType.Jump, interrupt);
-            m.length_m = lengthM;
-            m.height_m = heightM;
-            m.turn_rad = turnRad;
-            m.allow_nearest = Client.ToByte(allowNearest);
-            return Request(ref m);
-        }
-
-        /// <summary>Requests to stand for a time.</summary>
-        public ulong Stand(uint avatar, double seconds, Interrupt interrupt = Interrupt.Queued)
-        {
-            stridewire_movement m = MakeMovement(avatar, MovementType.Stand, interrupt);
-            m.seconds = seconds;
-            return Request(ref m);
-        }
-
-        /// <summary>Requests a walk to a position and heading, through at most 64
-        /// waypoints.</summary>
-        public ulong WalkTo(uint avatar, Position at, double headingRad = 0.0,
-                            Position[] waypoints = null, double? speedMS = null,
-                            Interrupt interrupt = Interrupt.Queued)
-        {
-            stridewire_movement m = MakeMovement(avatar, MovementType.Walk, interrupt);
-            Write(at, m.at_m);
-            m.heading_rad = headingRad;
-            m.has_speed = Client.ToByte(speedMS.HasValue);
-            m.speed_m_s = speedMS.GetValueOrDefault();
-            fixed (Position* points = waypoints)  // The layout is that of three doubles.
-            {
-                m.waypoints_m = (double*)points;
-                m.waypoint_count = (UIntPtr)(waypoints == null ? 0 : waypoints.Length);
-                return Request(ref m);
-            }
         }
 
         // Poses.
