@@ -5,7 +5,7 @@ KIND is one of:
   cpp     limits.h, message_type.h, message_structs.h, message_list.h, codec.h and codec.cpp
   client  client/request_from_c.h, for the C API of the client
   json    fields_json.h and fields_json.cpp, for the test vectors
-  web     messages.ts and tables.ts, for the web client
+  web     messages.ts and tables.ts for the web client, and json.ts for its tests
 
 Files that would not change are left alone, so that nothing is compiled again.
 """
@@ -36,7 +36,8 @@ def files(schema, kind):
         return {"client/request_from_c.h": CApi(schema).header()}
     if kind == "web":
         web = TypeScript(schema)
-        return {"messages.ts": web.messages(), "tables.ts": web.tables()}
+        return {"messages.ts": web.messages(), "tables.ts": web.tables(),
+                "json.ts": web.json()}
     sys.exit(f"generate.py: unknown kind '{kind}'\n{__doc__}")
 
 

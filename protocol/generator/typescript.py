@@ -1,6 +1,8 @@
 """Writes the TypeScript modules of the web client: message interfaces and tables."""
 
 import json
+import re
+import textwrap
 
 HEAD = "// Generated from {schema} by protocol/generator. Do not edit.\n"
 ARRAYS = {"ubyte": "Uint8Array", "ushort": "Uint16Array", "uint": "Uint32Array",
@@ -10,7 +12,7 @@ ARRAYS = {"ubyte": "Uint8Array", "ushort": "Uint16Array", "uint": "Uint32Array",
 def lower_camel(name):
     """max_items -> maxItems, StepLeft -> stepLeft"""
     first, *rest = name.split("_")
-    return first[0].lower() + first[1:] + "".join(word.capitalize() for word in rest)
+    return first[:1].lower() + first[1:] + "".join(word.capitalize() for word in rest)
 
 
 class TypeScript:
@@ -56,9 +58,22 @@ class TypeScript:
             return f"readonly ({name})[]" if " " in name else f"{name}[]"
         return name + (" | null" if "optional" in f or f.default == "null" else "")
 
+    def documentation(self, f):
+        """The comment of a field, with the values of limits instead of their names in C++."""
+        text = re.sub(r"\bkMax(\w+)", lambda m: str(self.limit(m[1]) or m[0]), " ".join(f.doc))
+        lines = textwrap.wrap(text, 92)
+        return f"  /** {f'{chr(10)}   * '.join(lines)} */\n" if lines else ""
+
+    def limit(self, name):
+        """The value of the limit that C++ calls kMaxNAME."""
+        snake = re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
+        limit = self.schema.limits.get(f"max_{snake}")
+        return limit and limit.default
+
     def interface(self, table):
         tag = f"  type: '{table.name}';\n" if "message" in table else ""
-        members = "".join(f"  {self.name_of(f)}: {self.type_of(f)};\n" for f in table.fields)
+        members = "".join(f"{self.documentation(f)}  {self.name_of(f)}: {self.type_of(f)};\n"
+                          for f in table.fields)
         return f"export interface {table.get('cpp', table.name)} {{\n{tag}{members}}}\n"
 
     def messages(self):
@@ -106,13 +121,22 @@ class TypeScript:
             info["values"] = [lower_camel(v) for v in self.schema.enums[enum].values]
         if f.is_list:
             info["list"] = True
+        elif f.type in self.schema.enums:
+            info["initial"] = self.schema.enums[f.type].values.get(f.default, 0)
         elif f.type not in self.schema.tables and f.type != "string":
             info["initial"] = None if f.default == "null" else float(f.default or 0)
+        # The schema states a default for what may be absent.
+        if f.default or "only" in f or "optional" in f or (f.is_list and "min" not in f) or (
+                f.type == "bool" and "inverted" not in f):
+            info["absent"] = True
         table = self.schema.tables.get(f.type)
         if table is not None and table.get("native") == "ParameterSet":
             info["parameters"] = True
         if "only" in f:
             info["only"] = [lower_camel(name) for name in f.get("only").split()]
+        for condition in ("with", "without"):
+            if condition in f:
+                info[condition] = lower_camel(f.get(condition))
         flags = ("deprecated", "inverted", "number", "optional", "shared")
         return info | {name: True for name in flags if name in f}
 
@@ -131,6 +155,38 @@ class TypeScript:
         if self.only_member(table):
             info["alone"] = True
         return info
+
+    # ---- JSON of the test vectors
+
+    def json_rules(self, f):
+        rules = {"name": f.name}
+        if "json_omit" in f:
+            rules["omit"] = lower_camel(f.get("json_omit") or "")
+        if "bytes" in f:
+            rules["bytes"] = True
+        table = self.schema.tables.get(f.type)
+        if "json_array" in f or (table is not None and "native" in table):
+            rules["array"] = True
+        return rules
+
+    def json(self):
+        rows = "".join(f"  {json.dumps([self.json_rules(f) for f in t.all_fields])},\n"
+                       for t in self.schema.tables.values())
+        return self.head() + """
+/** How a field appears in the JSON of protocol/vectors. */
+export interface JsonField {
+  readonly name: string;
+  /** The field is omitted if the property of this name is empty; '': if the field is empty. */
+  readonly omit?: string;
+  /** The bytes are hexadecimal digits. */
+  readonly bytes?: boolean;
+  /** The struct is an array of its numbers. */
+  readonly array?: boolean;
+}
+
+/** The fields of each table, in the order of `tables`. */
+export const jsonFields: readonly (readonly JsonField[])[] = [
+""" + rows + "];\n"
 
     def tables(self):
         numbers = {name: number for number, name in enumerate(self.schema.tables)}
@@ -161,8 +217,14 @@ export interface FieldInfo {
   readonly number?: boolean;
   /** The table may be absent; it is then null. */
   readonly optional?: boolean;
+  /** The property may be absent. The field then has its initial value. */
+  readonly absent?: boolean;
   /** Values of the field `type` that use the field. It is absent for others. */
   readonly only?: readonly string[];
+  /** Name of a property without which the field is not used. */
+  readonly with?: string;
+  /** Name of a property with which the field is not used. */
+  readonly without?: string;
   /** The list is an object of parameters. */
   readonly parameters?: boolean;
   /** Equal texts of a message are stored once. */

@@ -9,13 +9,13 @@ import type {
   AvatarState, Observation, Region, Reply, Role, Subscription, WorldState
 } from './types';
 import {
-  MessageType, type ClientMessage, type Events, type Message, type Reply as ReplyMessage
+  MessageType, type Events, type Message, type Reply as ReplyMessage
 } from '../generated/messages';
 import * as commands from './wire/commands';
 import {avatarStateOf, eventOf, terrainOf} from './wire/convert';
 import {Malformed} from './wire/malformed';
 import {frameHeaderBytes, readMessage, typeOfFrame} from './wire/read';
-import {writeMessage} from './wire/write';
+import {writeMessage, type Draft} from './wire/write';
 import {WorldHandle} from './world';
 
 const inspectTimeoutS = 10;
@@ -141,7 +141,7 @@ export class Session {
     const world = new WorldHandle(this, name, role, recordingS, maxRecordedEvents);
     this.run(() => {
       try {
-        checkMessage(commands.joinWorld(name, role));
+        checkMessage({type: 'JoinWorld', name, role});
         for (const other of this.worlds) {
           if (other.name !== name) continue;
           // A refused world is replaced, so that the user can try again.
@@ -158,7 +158,7 @@ export class Session {
   }
 
   /** Sends the command that `make` returns. `make` throws an error if an argument is invalid. */
-  command(world: WorldHandle, make: () => ClientMessage): Promise<Reply> {
+  command(world: WorldHandle, make: () => Draft): Promise<Reply> {
     return new Promise((resolve) => this.run(() => {
       try {
         this.submit(world, make(), resolve);
@@ -228,7 +228,7 @@ export class Session {
     return new Promise((resolve) => this.run(() => {
       try {
         if (active === undefined) throw new StridewireError(Status.no_such_subscription, '');
-        this.submit(world, {type: 'StopObserving', seq: 1n, subscription: active.handle}, resolve);
+        this.submit(world, {type: 'StopObserving', subscription: active.handle}, resolve);
         world.subscriptions.delete(id);
       } catch (error) {
         resolve(refusal(error));
@@ -244,15 +244,13 @@ export class Session {
       });
       return Promise.resolve(makeReply(0, ''));
     }
-    return this.command(world, () => ({type: 'LeaveWorld', seq: 1n, world: 1}));
+    return this.command(world, () => ({type: 'LeaveWorld'}));
   }
 
   inspect(world: WorldHandle, avatar: number): Promise<AvatarState> {
     return new Promise((resolve, reject) => this.run(() => {
       try {
-        const {code, text} = this.call(world, {
-          type: 'InspectAvatar', nonce: 0n, world: 1, avatar
-        });
+        const {code, text} = this.call(world, {type: 'InspectAvatar', nonce: 0n, avatar});
         if (code !== 0) throw new StridewireError(code, text);
         this.inspections.set(BigInt(native().results[0]!),
                              {resolve, reject, deadlineS: this.nowS + inspectTimeoutS});
@@ -409,7 +407,7 @@ export class Session {
   }
 
   /** Sends a message to the module. The numbers that it returns are in `native().results`. */
-  private call(world: WorldHandle, message: ClientMessage): {code: number, text: string} {
+  private call(world: WorldHandle, message: Draft): {code: number, text: string} {
     const frame = writeMessage(message);
     native().setInput(frame);
     const code = native().call.command(this.client, world.handle, frame.length);
@@ -418,7 +416,7 @@ export class Session {
 
   /** Sends a command and returns the number of its subscription.
    * @throws StridewireError the module refuses the command */
-  private submit(world: WorldHandle, message: ClientMessage,
+  private submit(world: WorldHandle, message: Draft,
                  answer: (reply: Reply) => void): number {
     if (!this.worlds.has(world) || world.state === 'refused' || world.state === 'left') {
       checkMessage(message);
@@ -437,7 +435,7 @@ export class Session {
 
   /** Joins a world in the module and starts its subscriptions. */
   private attach(world: WorldHandle): void {
-    const {code, text} = this.call(world, commands.joinWorld(world.name, world.role));
+    const {code, text} = this.call(world, {type: 'JoinWorld', name: world.name, role: world.role});
     if (code !== 0) return this.refuse(world, makeReply(code, text));
     const {results} = native();
     world.handle = results[1]!;
@@ -761,7 +759,7 @@ type Repeat14 = [number, number, number, number, number, number, number, number,
 const finalizers = new FinalizationRegistry<number>((client) => native().call.destroy(client));
 
 /** @throws Malformed the message is invalid */
-function checkMessage(message: ClientMessage): void {
+function checkMessage(message: Draft): void {
   const frame = writeMessage(message);
   native().setInput(frame);
   if (native().call.check_frame(frame.length, 1) !== 0) return;

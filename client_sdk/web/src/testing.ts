@@ -38,7 +38,7 @@ export function decodeMessage(frame: ArrayBuffer, sender = senderOf(typeOfFrame(
  * @throws Error the message does not follow protocol/STANDARD.md
  */
 export function encodeMessage(message: Message): ArrayBuffer {
-  const frame = writeMessage(message);
+  const frame = writeMessage({...message});
   native().setInput(frame);
   const isClient = senderOf(MessageType[message.type]) === 'client';
   const bytes = native().call.encode_frame(frame.length, Number(isClient));

@@ -6,6 +6,7 @@
  * right-handed with +Y up. Heading 0 faces +Z, and turning left is positive. Quaternions have unit
  * length and are stored as x, y, z, w.
  */
+import type {RequestItem} from '../generated/messages';
 
 /** A `controller` may send commands and receives all events of the world. An `observer` may only
  * observe. */
@@ -70,6 +71,8 @@ export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | '
  */
 export type WorldState = 'pending' | 'joining' | 'joined' | 'refused' | 'left';
 export type Vec3 = readonly [number, number, number];
+/** Fields that may be absent. */
+type Given<T> = {[name in keyof T]?: NonNullable<T[name]>};
 
 /**
  * Parameters of a movement: `turn` in radians, all others in metres. Positions and distances are
@@ -190,76 +193,17 @@ export interface LayerRequest {
  * by more than 0.2 m, or its direction or heading by more than 60 degrees. The event `rejected`
  * contains the nearest one in reach. Smaller errors are visible in `WorldEvent.applied`.
  */
-export interface MovementRequest {
+export interface MovementRequest
+    extends Given<Omit<RequestItem, 'avatar' | 'requestId' | 'type'>> {
   avatar: number;
   /** Identifies the request in events, 1 to 2^64 - 1. Absent: the client counts from 1. */
   requestId?: number | bigint;
   type: MovementType;
-  /** Step: which foot moves. Default `auto`: the one that did not move in the last step. */
-  foot?: Foot | 'auto';
-  /**
-   * Step: world position where the ball of the foot lands. If present, the step ignores `lengthM`,
-   * `sideM`, `heightM` and `turnRad`.
-   *
-   * Walk: destination on the ground; required. Events of all its steps contain the walk's request
-   * id. The walk ends with an event `finished` of kind `stand`, or with `rejected` if the avatar
-   * cannot continue.
-   */
-  atM?: Vec3;
-  /** Step with `atM`: heading of the foot; absent: the server chooses. Walk: final heading;
-   * required. */
-  headingRad?: number;
-  /** Step: true rejects the step unless the foot lands exactly at its place. Default false. */
-  exactOnly?: boolean;
-  /** Step, jump: true plays the nearest movement of the library, however far it is from the
-   * request. Not together with `exactOnly`. Default false. */
-  allowNearest?: boolean;
-  /** Walk: positions to pass on the way, at most 64. */
-  waypointsM?: readonly Vec3[];
-  /**
-   * Walk: speed, 0.05 to 5. The avatar walks at the closest speed that the motion library allows
-   * (`WorldEvent.speedMPerS`). Absent: a comfortable speed.
-   */
-  speedMPerS?: number;
-  /** Default `none`. */
-  interrupt?: Interrupt;
-  /** Step: forward distance between the feet at the end. Jump: forward distance. */
-  lengthM?: number;
-  /** Step: sideways distance between the feet at the end, positive towards the moving foot's side.
-   * Absent: the usual distance of the motion library. */
-  sideM?: number;
-  /** Step: height of the moving foot above the other foot at the end. Jump: height of the end above
-   * the start. */
-  heightM?: number;
-  /** Step, jump: change of heading. */
-  turnRad?: number;
-  /** Stand: duration. */
-  seconds?: number;
 }
 
-/** A request that waits in an avatar's queue. Fields are as in `MovementRequest`. */
-export interface QueuedRequest {
-  readonly avatar: number;
-  readonly requestId: bigint;
-  readonly type: MovementType;
-  readonly foot: Foot | 'auto';
-  /** Destination; null unless the request is a walk or a step to a position. */
-  readonly atM: Vec3 | null;
-  /** Requested heading; null if the server chooses it. */
-  readonly headingRad: number | null;
-  readonly lengthM: number;
-  /** Requested sideways distance; null for the usual distance of the motion library. */
-  readonly sideM: number | null;
-  readonly heightM: number;
-  readonly turnRad: number;
-  readonly seconds: number;
-  readonly waypointsM: readonly Vec3[];
-  /** Requested walking speed; null for a comfortable speed. */
-  readonly speedMPerS: number | null;
-  readonly interrupt: Interrupt;
-  readonly exactOnly: boolean;
-  readonly allowNearest: boolean;
-}
+/** A request that waits in an avatar's queue. Fields that its type does not use are 0, empty or
+ * null. */
+export type QueuedRequest = Readonly<RequestItem>;
 
 /** State of an avatar at a tick: the result of `World.inspect`. */
 export interface AvatarState {

@@ -8,12 +8,12 @@ import {
   type Observation, type Pose, type PoseKind, type Recording, type Reply, type Role, type Skeleton,
   type SpawnItem, type Subscription, type Terrain, type World, type WorldListeners, type WorldState
 } from './types';
-import type {Observe, WorldInfo} from '../generated/messages';
+import type {WorldInfo} from '../generated/messages';
 import * as commands from './wire/commands';
 
 /** A subscription that the client restores after lost sessions. */
 export interface ActiveSubscription {
-  message: Observe;
+  message: commands.ObserveDraft;
   /** Number in the module; 0 if the client is not connected. */
   handle: number;
   /** Called with the reply to an observation that has not been sent yet; otherwise null. */

@@ -185,6 +185,10 @@ class VariantTest(unittest.TestCase):
         self.assertIn("    case 1: FromJson(json, m.movement.emplace<RunMovement>()); break;",
                       source)
 
+    def test_web_client_knows_which_fields_are_used(self):
+        tables = TypeScript(read(VARIANT)).tables()
+        self.assertIn('"absent": true, "only": ["hop", "run"], "without": "at"', tables)
+
 
 class TypeScriptTest(unittest.TestCase):
     def setUp(self):

@@ -1,24 +1,17 @@
 import type {
-  LayerRequest, MovementRequest, Observation, Region, Role, SpawnItem, Terrain
+  LayerRequest, MovementRequest, Observation, Region, SpawnItem, Terrain
 } from '../types';
-import type {
-  CancelQueue, HeightFieldInfo, JoinWorld, Observe, Region as RegionEntry, Remove, Request,
-  RequestItem, SetLayers, SetPlanting, SetTerrain, Spawn, TerrainBoxInfo
-} from '../../generated/messages';
+import type {PoseDetail, Region as RegionEntry} from '../../generated/messages';
 import {Malformed} from './malformed';
+import type {Draft} from './write';
 
 /**
- * Converts arguments of the public interface to messages. writeMessage checks the types of values
- * and the WebAssembly module their ranges. The session sets `seq` and `world`, so the numbers here
- * only have to be valid.
+ * Converts arguments of the public interface to messages where they differ. writeMessage checks the
+ * types of values and the WebAssembly module their ranges.
  */
 
-const anySeq = 1n;
-const anyWorld = 1;
-const maxRequestId = 0xffff_ffff_ffff_ffffn;
-
 /** Checks that an argument is a list, and converts its entries. */
-function convert<T, U>(items: readonly T[], field: string, entry: (item: T, i: number) => U): U[] {
+function convert<T, U>(items: readonly T[], field: string, entry: (item: T) => U): U[] {
   if (items === null || typeof items !== 'object' || typeof items.length !== 'number') {
     throw new Malformed(`${field}: expected a list`);
   }
@@ -26,133 +19,74 @@ function convert<T, U>(items: readonly T[], field: string, entry: (item: T, i: n
     if (item === null || item === undefined) {
       throw new Malformed(`${field}[${i}]: expected an object`);
     }
-    return entry(item, i);
+    return entry(item);
   });
 }
 
-const numbers = (list: readonly number[], field: string): Uint32Array =>
-    convert(list, field, (number) => number) as never;
-
-export function joinWorld(name: string, role: Role): JoinWorld {
-  return {type: 'JoinWorld', seq: anySeq, name, role};
+export function spawn(items: readonly SpawnItem[]): Draft {
+  return {type: 'Spawn', items};
 }
 
-export function spawn(items: readonly SpawnItem[]): Spawn {
-  return {
-    type: 'Spawn', seq: anySeq, world: anyWorld,
-    items: convert(items, 'items', ({avatar, positionM, headingRad, teleport}) =>
-        ({avatar: avatar ?? 0, positionM, headingRad, teleport: teleport ?? false})),
-  };
+export function remove(avatars: readonly number[]): Draft {
+  return {type: 'Remove', avatars};
 }
 
-export function remove(avatars: readonly number[]): Remove {
-  return {type: 'Remove', seq: anySeq, world: anyWorld, avatars: numbers(avatars, 'avatars')};
-}
-
-export function cancelQueue(avatars: readonly number[]): CancelQueue {
-  return {type: 'CancelQueue', seq: anySeq, world: anyWorld, avatars: numbers(avatars, 'avatars')};
+export function cancelQueue(avatars: readonly number[]): Draft {
+  return {type: 'CancelQueue', avatars};
 }
 
 /** The function `nextId` returns an id for a request that has none. */
-export function request(items: readonly MovementRequest[], nextId: () => bigint): Request {
+export function request(items: readonly MovementRequest[], nextId: () => bigint): Draft {
   return {
-    type: 'Request', seq: anySeq, world: anyWorld,
-    items: convert(items, 'items', (item, i) => requestItem(item, i, nextId)),
+    type: 'Request',
+    items: convert(items, 'items', (item) => ({...item, requestId: item.requestId ?? nextId()})),
   };
 }
 
-/** Fields that the type of the request does not use are ignored. */
-function requestItem(item: MovementRequest, index: number, nextId: () => bigint): RequestItem {
-  const {type} = item;
-  const step = type === 'step';
-  const walk = type === 'walk';
-  const at = walk || step ? item.atM ?? null : null;
-  const moves = (step || type === 'jump') && at === null;
-  const fail = (field: string, what: string): never => {
-    throw new Malformed(`items.${field}[${index}]: ${what}`);
-  };
-  if (walk && at === null) fail('atM', 'expected a destination');
-  if (walk && item.headingRad === undefined) fail('headingRad', 'expected a finite number');
-  const {exactOnly = false, allowNearest = false} = item;
-  if (exactOnly && (!step || allowNearest)) {
-    fail('exactOnly', 'is only allowed for a step without allowNearest');
-  }
-  if (allowNearest && !step && type !== 'jump') {
-    fail('allowNearest', 'is only allowed for a step or jump');
-  }
-  const {requestId} = item;
-  const isInteger = typeof requestId === 'bigint' ||
-      (typeof requestId === 'number' && Number.isSafeInteger(requestId));
-  if (requestId !== undefined && (!isInteger || requestId < 1 || requestId > maxRequestId)) {
-    fail('requestId', 'expected a bigint or a safe integer, at least 1');
-  }
-  return {
-    avatar: item.avatar,
-    requestId: requestId === undefined ? nextId() : BigInt(requestId),
-    type,
-    foot: step ? item.foot ?? 'auto' : 'auto',
-    atM: at,
-    headingRad: at === null ? null : item.headingRad ?? null,
-    lengthM: moves ? item.lengthM ?? 0 : 0,
-    sideM: step && moves ? item.sideM ?? null : null,
-    heightM: moves ? item.heightM ?? 0 : 0,
-    turnRad: moves ? item.turnRad ?? 0 : 0,
-    seconds: type === 'stand' ? item.seconds ?? 0 : 0,
-    waypointsM: walk ? [...item.waypointsM ?? []] : [],
-    speedMPerS: walk ? item.speedMPerS ?? null : null,
-    interrupt: item.interrupt ?? 'none',
-    exactOnly,
-    allowNearest,
-  };
-}
-
-export function setTerrain(terrain: Terrain | null): SetTerrain {
+export function setTerrain(terrain: Terrain | null): Draft {
   if (terrain !== null && typeof terrain !== 'object') {
     throw new Malformed('terrain: expected an object or null');
   }
   return {
-    type: 'SetTerrain', seq: anySeq, world: anyWorld,
+    type: 'SetTerrain',
     terrain: terrain && {
-      heightField: (terrain.heightField ?? null) as HeightFieldInfo | null,
-      boxes: convert(terrain.boxes ?? [], 'boxes', ({minM, maxM, heightM}): TerrainBoxInfo => ({
-        minX: minM?.[0], minZ: minM?.[1], maxX: maxM?.[0], maxZ: maxM?.[1], heightM
-      })),
+      heightField: terrain.heightField ?? null,
+      boxes: convert(terrain.boxes ?? [], 'boxes', ({minM, maxM, heightM}) =>
+          ({minX: minM?.[0], minZ: minM?.[1], maxX: maxM?.[0], maxZ: maxM?.[1], heightM})),
     },
   };
 }
 
-export function setLayers(items: readonly LayerRequest[]): SetLayers {
+export function setLayers(items: readonly LayerRequest[]): Draft {
   return {
-    type: 'SetLayers', seq: anySeq, world: anyWorld,
-    items: convert(items, 'items', ({avatar, layer, enabled, weight, blendS, speed}, i) => {
-      if (typeof (enabled ?? true) !== 'boolean') {
-        throw new Malformed(`items.enabled[${i}]: expected true or false`);
+    type: 'SetLayers',
+    items: convert(items, 'items', ({enabled = true, ...item}) => {
+      if (typeof enabled !== 'boolean') {
+        throw new Malformed('items.enabled: expected true or false');
       }
-      return {
-        avatar, layer, fadeOut: enabled === false, weight: weight ?? 1, blendS: blendS ?? 0.3,
-        speed: speed ?? 1,
-      };
+      return {...item, fadeOut: !enabled};
     }),
   };
 }
 
-export function setPlanting(avatars: readonly number[], enabled: boolean): SetPlanting {
-  return {
-    type: 'SetPlanting', seq: anySeq, world: anyWorld, avatars: numbers(avatars, 'avatars'), enabled
-  };
+export function setPlanting(avatars: readonly number[], enabled: boolean): Draft {
+  return {type: 'SetPlanting', avatars, enabled};
 }
 
-export function observe(observation: Observation): Observe {
+export type ObserveDraft = Draft & {
+  readonly region: RegionEntry | null;
+  readonly detail: PoseDetail;
+};
+
+export function observe(observation: Observation): ObserveDraft {
   if (observation === null || typeof observation !== 'object') {
     throw new Malformed('observation: expected an object');
   }
-  const detail = observation.detail ?? 'all';
+  const {detail = 'all', withEvents} = observation;
   return {
-    type: 'Observe', seq: anySeq, world: anyWorld, subscription: 1,
-    mode: observation.mode,
-    avatars: numbers(observation.avatars ?? [], 'avatars'),
-    everyNTicks: observation.everyNTicks ?? 1,
-    withEvents: observation.withEvents === true,
+    ...observation,
+    type: 'Observe',
+    withEvents: withEvents === true,
     region: observation.region === undefined ? null : region(observation.region, detail),
     replace: false,
     detail,
@@ -160,7 +94,7 @@ export function observe(observation: Observation): Observe {
 }
 
 /** `beyond` is the detail of the observation. */
-export function region(asked: Region, beyond: Observe['detail']): RegionEntry {
+export function region(asked: Region, beyond: PoseDetail): RegionEntry {
   if (asked === null || typeof asked !== 'object') {
     throw new Malformed('region: expected an object');
   }

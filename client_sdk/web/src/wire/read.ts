@@ -47,21 +47,22 @@ function readTable(view: DataView, at: number, info: TableInfo): unknown {
   if (info.alone) return readField(view, fieldAt(view, at, 0), info.fields[0]!);
   const table: {[name: string]: unknown} = {};
   info.fields.forEach((field, slot) => {
-    if (field.deprecated) return;
-    const unused = field.only !== undefined && !field.only.includes(table['type'] as string);
-    table[field.name] = readField(view, unused ? 0 : fieldAt(view, at, slot), field);
+    if (!field.deprecated) table[field.name] = readField(view, fieldAt(view, at, slot), field);
   });
-  if (info.name === 'RequestItem') dropUnused(table);
+  for (const field of info.fields) {
+    if (isUsed(info, field, table)) continue;
+    table[field.name] = field.type === 'bool' ? false : readField(view, 0, field);
+  }
   return table;
 }
 
-/** Resets the fields of a request that have no meaning. The module does not check them. */
-function dropUnused(item: {[name: string]: unknown}): void {
-  if (item['exactOnly'] || !['step', 'jump'].includes(item['type'] as string)) {
-    item['allowNearest'] = false;
-  }
-  Object.assign(item, item['atM'] === null ? {headingRad: null}
-                                           : {lengthM: 0, sideM: null, heightM: 0, turnRad: 0});
+/** Returns false if the value of a field has no meaning. The module does not check it then. */
+export function isUsed(info: TableInfo, {only, with: needed, without}: FieldInfo,
+                       table: {readonly [name: string]: unknown}): boolean {
+  const has = (name: string): boolean => Boolean(table[name]) &&
+      isUsed(info, info.fields.find((field) => field.name === name)!, table);
+  return (only === undefined || only.includes(table['type'] as string)) &&
+      (needed === undefined || has(needed)) && (without === undefined || !has(without));
 }
 
 function readStruct(view: DataView, at: number, info: TableInfo): unknown {

@@ -1,26 +1,31 @@
 import {Builder} from 'flatbuffers';
-import {MessageType, type Message} from '../../generated/messages';
+import {MessageType, type MessageName} from '../../generated/messages';
 import {tableNumbers, tables, type FieldInfo, type TableInfo} from '../../generated/tables';
 import {Malformed} from './malformed';
 import {parameterList} from './parameters';
-import {frameHeaderBytes} from './read';
+import {frameHeaderBytes, isUsed} from './read';
 
 type Fields = {readonly [name: string]: unknown};
+/** A message whose values have not been checked. */
+export type Draft = Fields & {readonly type: MessageName};
 
 const builder = new Builder(1024);
 const magic = 0x1a505753;  // "SWP", 0x1a
 const frameVersion = 1;
 
 /**
- * Writes a message as a frame.
+ * Writes a message as a frame. Properties may be absent if the schema states a default. The module
+ * sets `seq`, and `world` and `subscription` of commands, so if they are absent, any valid number
+ * is written.
  * @throws Malformed a value has the wrong type, or does not fit into the type of its field. The
  *     WebAssembly module checks everything else.
  */
-export function writeMessage(message: Message): Uint8Array<ArrayBuffer> {
+export function writeMessage(message: Draft): Uint8Array<ArrayBuffer> {
   const table = tables[tableNumbers[message.type]]!;
-  checkFields(table, message as never, '', -1);
+  const fields = {seq: 1, world: 1, subscription: 1, ...message};
+  checkFields(table, fields, '', -1);
   builder.clear();
-  builder.finish(buildTable(builder, table, message as never));
+  builder.finish(buildTable(builder, table, fields));
   const payload = builder.asUint8Array();
   const bytes = Math.ceil(payload.length / 8) * 8;
   const frame = new Uint8Array(frameHeaderBytes + bytes);
@@ -42,9 +47,25 @@ const ranges: {readonly [type: string]: readonly [number, number]} = {
 function checkFields(info: TableInfo, value: Fields, path: string, index: number): void {
   if (value === null || typeof value !== 'object') fail('expected an object', path, index);
   for (const field of info.fields) {
-    if (field.deprecated) continue;
-    checkField(field, value[field.name], path === '' ? field.name : `${path}.${field.name}`, index);
+    const at = path === '' ? field.name : `${path}.${field.name}`;
+    if (isUsed(info, field, value)) {
+      if (!field.deprecated) checkField(field, given(field, value), at, index);
+    } else if (field.type === 'bool' && (value[field.name] ?? false) !== false) {
+      fail(field.only!.includes(value['type'] as string)
+          ? `cannot be combined with ${field.without}`
+          : `is only allowed for the types ${field.only!.join(', ')}`, at, index);
+    }
   }
+}
+
+/** Returns the value of a field. A property that is absent has the initial value. */
+function given(field: FieldInfo, fields: Fields): unknown {
+  const value = fields[field.name];
+  if (value !== undefined || !field.absent) return value;
+  if (field.list) return [];
+  if (field.type === 'bool') return false;
+  if (field.optional || field.initial === null) return null;
+  return field.values === undefined ? field.initial : field.values[field.initial!];
 }
 
 function checkField(field: FieldInfo, value: unknown, path: string, index: number): void {
@@ -193,12 +214,14 @@ function buildList(b: Builder, field: FieldInfo, list: ArrayLike<unknown>): numb
 }
 
 function buildTable(b: Builder, info: TableInfo, m: Fields): number {
-  const targets = info.fields.map((field) =>
-      field.deprecated ? 0 : buildTarget(b, field, m[field.name]));
+  const values = info.fields.map((field) =>
+      field.deprecated || !isUsed(info, field, m) ? null : given(field, m));
+  const targets = info.fields.map((field, slot) =>
+      values[slot] === null ? 0 : buildTarget(b, field, values[slot]));
   b.startObject(info.fields.length);
   info.fields.forEach((field, slot) => {
-    const value = m[field.name];
-    if (field.deprecated || value === null) return;
+    const value = values[slot];
+    if (value === null) return;
     if (targets[slot] !== 0) {
       b.addFieldOffset(slot, targets[slot]!, 0);
     } else if (field.table !== undefined && tables[field.table]!.struct && !field.list) {
