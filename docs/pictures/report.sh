@@ -63,17 +63,18 @@ for name in names:
               f"| {after['condition']:.0f} |")
 print()
 print("| captures, group | movements, parameters | synthesized, cm | nearest, cm "
-      "| inverse distance, cm | better than nearest | better than inverse distance | foot, cm "
-      "| keytimes, ms |")
-print("| --- " * 9 + "|")
+      "| inverse distance, cm | better than nearest | better than inverse distance "
+      "| planted, cm | foot, cm | keytimes, ms |")
+print("| --- " * 10 + "|")
 for name in names:
     for g, group in enumerate(reports[name].get("realism", [])):
         if not group["movements"]: continue
         methods = [group[m] for m in ("cardinal", "nearest", "inverse_distance")]
         cm = [100 * m["pose_m"] for m in methods]
+        planted = ", ".join(f"{100 * m['planted_m']:.2f}" for m in methods)
         feet = ", ".join(f"{100 * m['foot_m']:.1f}" for m in methods)
         keys = ", ".join(f"{1000 * m['keytime_s']:.0f}" for m in methods)
         print(f"| {name}, {g} {group['kind']} | {group['movements']}, {group['parameters']} "
               f"| {cm[0]:.2f} | {cm[1]:.2f} | {cm[2]:.2f} | {100 * (1 - cm[0] / cm[1]):.0f} % "
-              f"| {100 * (1 - cm[0] / cm[2]):.0f} % | {feet} | {keys} |")
+              f"| {100 * (1 - cm[0] / cm[2]):.0f} % | {planted} | {feet} | {keys} |")
 PYTHON

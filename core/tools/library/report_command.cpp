@@ -59,9 +59,13 @@ Json RealismToJson(const MotionLibrary& captured, const std::vector<LeaveOneOut>
         parts[std::string(BodyPartName(static_cast<BodyPart>(p)))] = mean.part_m[p];
       }
       entry[std::string(BlendMethodName(static_cast<BlendMethod>(m)))] = {
-          {"pose_m", mean.pose_m},           {"parts_m", std::move(parts)},
-          {"foot_m", mean.foot_m},           {"keytime_s", mean.keytime_s},
-          {"parameter_m", mean.parameter_m}, {"won_by_cardinal", realism[g].wins[m]}};
+          {"pose_m", mean.pose_m},
+          {"parts_m", std::move(parts)},
+          {"planted_m", mean.planted_m},
+          {"foot_m", mean.foot_m},
+          {"keytime_s", mean.keytime_s},
+          {"parameter_m", mean.parameter_m},
+          {"won_by_cardinal", realism[g].wins[m]}};
     }
     json.push_back(std::move(entry));
   }

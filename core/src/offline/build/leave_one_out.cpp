@@ -10,10 +10,15 @@
 #include "offline/build/example_clusters.h"
 #include "offline/build/parameter_scales.h"
 #include "offline/build/smooth_examples.h"
+#include "runtime/avatar/avatar_body.h"
 #include "runtime/library/cardinal_basis.h"
+#include "runtime/library/contact_keytimes.h"
 #include "runtime/library/convex_hull.h"
+#include "runtime/plan/foot_locks.h"
+#include "runtime/plan/foot_planner.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
 
@@ -142,6 +147,7 @@ std::vector<double> NearestWeights(const MotionGroup& group, int left_out, std::
 struct Comparison {
   bool is_valid = false;
   PoseError pose;
+  double planted_m = 0.0;
   double foot_m = 0.0;
   double keytime_s = 0.0;
   double parameter_m = 0.0;
@@ -160,12 +166,17 @@ std::vector<double> Keytimes(const MotionGroup& group, std::span<const double> w
 
 class Comparer {
  public:
-  Comparer(const MotionLibrary& library, const MotionGroup& group)
+  Comparer(const MotionLibrary& library, int group_index)
       : library_(library),
-        group_(group),
+        group_index_(group_index),
+        group_(library.group(group_index)),
         comparison_(library.skeleton(), library.stand_pose()),
         cache_(library.layout()),
-        pose_(library.skeleton().joint_count()) {}
+        pose_(library.skeleton().joint_count()),
+        body_(std::shared_ptr<const MotionLibrary>(std::shared_ptr<void>(), &library)),
+        plan_scratch_(library) {
+    body_.plants_feet = true;
+  }
 
   // Returns the weights [example] that an avatar would use: for parameters projected onto the hull
   // of the other examples, and corrected. Returns an empty vector if the weights cannot be solved.
@@ -199,6 +210,53 @@ class Comparer {
     return {movement_.weights.begin(), movement_.weights.end()};
   }
 
+  // Returns poses of the movement with these weights as a viewer sees them: the feet start where
+  // those of the left-out example do, and the moving foot lands on its footprint.
+  std::vector<Pose> PlantedPoses(int left_out, std::span<const double> weights,
+                                 std::span<const Pose> truth) {
+    const Foot moving = MovingFoot(group_.kind);
+    const auto m = static_cast<std::size_t>(moving);
+    // Returns the feet of a pose. The moving foot stands at the height of a parameter, if there is
+    // one, and the other foot at 0.
+    const auto feet_of = [&](const Pose& pose, ParameterName height) {
+      FootLocks feet = FootLocksOf(library_.skeleton(), library_.leg_rig(), pose, 0.0, nullptr);
+      if (const int l = group_.FindParameter(height); l >= 0) {
+        feet[m].print.position_m.y = GroundRise(group_.site(left_out)[static_cast<std::size_t>(l)]);
+      }
+      return feet;
+    };
+    RequestPlan request;
+    request.group = group_index_;
+    request.requested = request.applied = ValuesOf(group_.site(left_out));
+    request.exact = feet_of(truth.back(), ParameterName::kEndY)[m].print;
+    request.turn_rad = group_.heading_change_rad[static_cast<std::size_t>(left_out)];
+
+    AvatarBody& body = body_;
+    body.locks = feet_of(truth.front(), ParameterName::kStartY);
+    body.movement.group = group_index_;
+    // The avatar begins in the first pose of the blend, planted on these footprints.
+    ApplyWeights(group_, weights, body.movement);
+    body.StartWeighted(BaseFrame{}, 1.0);
+    plan_scratch_.cache().Clear();
+    EvaluateBlend(group_, library_.layout(), body.movement, 0.0, plan_scratch_.cache(),
+                  body.blended_pose);
+    const FootLocks blended = feet_of(body.blended_pose, ParameterName::kStartY);
+    body.blended_pose.root_position_m +=
+        Vec3(body.locks[1 - m].print.position_m - blended[1 - m].print.position_m);
+    StandOn(body.locks, body.movement);
+    body.earlier_feet[0] =
+        CorrectFeet(library_.skeleton(), library_.leg_rig(), body.movement, 0.0, body.blended_pose);
+    body.StartWeighted(BaseFrame{}, 1.0);
+    body.BlendIn(LandingTarget{request, nullptr, DVec3(0.0)}, false, plan_scratch_);
+
+    std::vector<Pose> poses;
+    for (int p = 0; p < group_.grid_point_count; ++p) {
+      body.Evaluate(body.movement.warp.TimeAt(p));
+      poses.push_back(body.pose);
+    }
+    return poses;
+  }
+
   Comparison Compare(int left_out, std::span<const double> weights) {
     STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group_.example_count));
     std::vector<double> one(weights.size());
@@ -210,6 +268,10 @@ class Comparer {
     if (!pose) return result;
     result.is_valid = true;
     result.pose = *pose;
+    if (IsStep(group_.kind) && library_.leg_rig().is_usable) {
+      const auto planted = comparison_.Measure(truth, PlantedPoses(left_out, weights, truth));
+      if (planted) result.planted_m = planted->mean_m;
+    }
     int feet = 0;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       if (IsStep(group_.kind) && foot != MovingFoot(group_.kind)) continue;
@@ -241,16 +303,20 @@ class Comparer {
 
  private:
   const MotionLibrary& library_;
+  int group_index_;
   const MotionGroup& group_;
   PoseComparison comparison_;
   GridCache cache_;
   Pose pose_;
+  AvatarBody body_;
+  FootPlanScratch plan_scratch_;
   Movement movement_;
 };
 
 void AddTo(LeftOutMean& mean, const Comparison& one, double share) {
   mean.pose_m += share * one.pose.mean_m;
   for (std::size_t p = 0; p < mean.part_m.size(); ++p) mean.part_m[p] += share * one.pose.part_m[p];
+  mean.planted_m += share * one.planted_m;
   mean.foot_m += share * one.foot_m;
   mean.keytime_s += share * one.keytime_s;
   mean.parameter_m += share * one.parameter_m;
@@ -275,7 +341,7 @@ LeaveOneOut MeasureLeaveOneOut(const MotionLibrary& library, int group_index,
   const auto n = static_cast<std::size_t>(group.example_count);
   const int threads = ThreadCount(0);
   std::vector<Comparer> comparers;
-  for (int t = 0; t < threads; ++t) comparers.emplace_back(library, group);
+  for (int t = 0; t < threads; ++t) comparers.emplace_back(library, group_index);
   std::vector<std::array<Comparison, kBlendMethodCount>> all(n);
   const std::vector<double> products =
       MovementProducts(group, library.layout(), library.skeleton());

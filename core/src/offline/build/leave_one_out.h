@@ -26,6 +26,9 @@ struct LeftOutMean {
   double pose_m = 0.0;  ///< Distance of joints at equal generic times.
   /// Distance of the joints of each part of the body.
   std::array<double, kBodyPartCount> part_m{};
+  /// Value of `pose_m` if the feet are planted on the footprints of the captured step, as avatars
+  /// do. 0 for jumps, and if the feet of the skeleton cannot be planted.
+  double planted_m = 0.0;
   double foot_m = 0.0;     ///< Distance of the ball of the moving foot, or of both balls in a jump.
   double keytime_s = 0.0;  ///< Difference between keytimes, except the first.
   /// Largest difference between a requested and a synthesized parameter.

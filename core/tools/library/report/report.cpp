@@ -67,7 +67,7 @@ std::string Cm(double m) { return Text("%.2f", 100.0 * m); }
 // Compares synthesized with captured movements.
 Section RealismSection(const MotionLibrary& captured, const std::vector<LeaveOneOut>& realism) {
   HtmlTable rows = {{"Group", "Parameters", "Movements", "Method", "Joints, cm", "Trunk", "Head",
-                     "Arms", "Legs", "Foot, cm", "Keytimes, ms", "Parameters, cm",
+                     "Arms", "Legs", "Planted, cm", "Foot, cm", "Keytimes, ms", "Parameters, cm",
                      "Cardinal is nearer"}};
   for (std::size_t g = 0; g < realism.size(); ++g) {
     const MotionGroup& group = captured.groups()[g];
@@ -83,6 +83,7 @@ Section RealismSection(const MotionLibrary& captured, const std::vector<LeaveOne
           m == 0 ? std::to_string(group.parameter_count()) : "",
           m == 0 ? std::to_string(left_out.movements) : "", method, Cm(mean.pose_m)};
       for (const double part_m : mean.part_m) row.push_back(Cm(part_m));
+      row.push_back(mean.planted_m > 0.0 ? Cm(mean.planted_m) : "");
       row.push_back(Cm(mean.foot_m));
       row.push_back(Text("%.0f", 1000.0 * mean.keytime_s));
       row.push_back(Cm(mean.parameter_m));
@@ -92,13 +93,16 @@ Section RealismSection(const MotionLibrary& captured, const std::vector<LeaveOne
       rows.push_back(std::move(row));
     }
   }
-  return {"realism", "Realism",
-          "<p>Leave-one-out test: each captured movement is synthesized from all "
-          "others with its own parameters and compared with the capture by the mean distance of "
-          "joints at equal generic times. Parameters outside the hull of the others are moved to "
-          "its edge. The other methods are the nearest captured movement without changes, and the "
-          "nearest d + 1 blended by inverse distance, as in blend spaces.</p>\n" +
-              TableHtml(rows)};
+  return {
+      "realism", "Realism",
+      "<p>Leave-one-out test: each captured movement is synthesized from all "
+      "others with its own parameters and compared with the capture by the mean distance of "
+      "joints at equal generic times. Parameters outside the hull of the others are moved to "
+      "its edge. The column \"Planted\" contains the same distance for steps as avatars display "
+      "them, with both feet on the footprints of the captured step. The other methods are the "
+      "nearest captured movement without changes, and the "
+      "nearest d + 1 blended by inverse distance, as in blend spaces.</p>\n" +
+          TableHtml(rows)};
 }
 
 bool IsMirrored(const MotionGroup& group) {

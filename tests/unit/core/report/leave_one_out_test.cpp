@@ -17,6 +17,7 @@ TEST(LeaveOneOut, CardinalWeightsAreNearestForGeneratedSteps) {
   EXPECT_LT(cardinal.parameter_m, nearest.parameter_m);
   EXPECT_GT(cardinal.pose_m, 0.0);
   EXPECT_GT(inverse.pose_m, 0.0);
+  for (const LeftOutMean& mean : left_out.means) EXPECT_GT(mean.planted_m, 0.0);
   EXPECT_EQ(left_out.wins[0], 0.0);
   EXPECT_GT(left_out.wins[1], 0.5);
 }
