@@ -22,6 +22,8 @@ constexpr double kVelocityStepS = 0.004;
 // Fractions of the swing at which the reach of the legs is checked.
 constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
 constexpr double kMaxRootSinkM = 0.3;
+// Largest shift of the root towards the centre between the feet.
+constexpr double kMaxCentreShiftM = 0.1;
 
 // Maximum sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
@@ -398,6 +400,19 @@ class Planner {
     return std::min(push_m, kMaxPushM);
   }
 
+  // Returns the shift that takes the root to the centre between both feet by the end of a step,
+  // where the blend has it. The root follows the supporting foot. If the other foot lands elsewhere
+  // than in the blend, the body would otherwise lean towards the supporting foot.
+  DVec3 ShiftToCentre(Foot moving) const {
+    const FootPlan& plan = movement_.feet;
+    const Foot fixed = OtherFoot(moving);
+    const DVec3 planned_m = plan.foot(moving).to.position_m - plan.foot(fixed).to.position_m;
+    DVec3 shift = 0.5 * (planned_m - EndVector(fixed, moving));
+    shift.y = 0.0;
+    const double length_m = std::sqrt(shift.x * shift.x + shift.z * shift.z);
+    return shift * std::min(1.0, kMaxCentreShiftM / std::max(length_m, kMaxCentreShiftM));
+  }
+
   // Returns the shift that moves the root above `place_m` by the end of the movement.
   DVec3 RootShift(const DVec3& place_m) {
     const double end_s = movement_.duration_s();
@@ -641,6 +656,7 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
       landing = planner.ChooseLanding(locks, *target, moving);
     }
     planner.BlendSwing(moving, landing, trajectory);
+    plan.feet[x].root_shift_m = planner.ShiftToCentre(moving);
     if (!plan.keeps_above_ground) planner.LiftOverLevelGround(moving);
     if (target == nullptr) {
       if (plan.keeps_above_ground) trajectory.lift_m = decision.lift_m;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "captured_library.h"
 #include "stridewire/offline/open_library.h"
 
 namespace stridewire {
@@ -20,6 +21,26 @@ TEST(LeaveOneOut, CardinalWeightsAreNearestForGeneratedSteps) {
   for (const LeftOutMean& mean : left_out.means) EXPECT_GT(mean.planted_m, 0.0);
   EXPECT_EQ(left_out.wins[0], 0.0);
   EXPECT_GT(left_out.wins[1], 0.5);
+}
+
+// The footprints of a captured step determine a part of its pose. If planting uses them well, steps
+// are nearer to their captures than without planting.
+TEST(LeaveOneOut, PlantingBringsCapturedStepsNearer) {
+  const std::vector<std::string> subjects = {kDebianTakes};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const RawLibrary raw = AssembleTakes(TakesOf(subjects), {});
+  const auto library = LibraryBuilder().Build(raw);
+  ASSERT_TRUE(library.has_value());
+  int groups = 0;
+  for (int g = 0; g < static_cast<int>((*library)->groups().size()); ++g) {
+    if (!IsStep((*library)->group(g).kind)) continue;
+    const LeaveOneOut left_out = MeasureLeaveOneOut(**library, g);
+    if (left_out.movements == 0) continue;
+    ++groups;
+    EXPECT_GT(left_out.means[0].planted_m, 0.0);
+    EXPECT_LT(left_out.means[0].planted_m, 0.88 * left_out.means[0].pose_m) << "group " << g;
+  }
+  EXPECT_EQ(groups, 4);
 }
 
 TEST(LeaveOneOut, DoesNotUseTheLeftOutExample) {
