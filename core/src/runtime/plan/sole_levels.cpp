@@ -17,6 +17,24 @@ Quartic QuarticThrough(std::array<double, kLevelSamples.size()> values) {
            256.0 * d[3] / 24.0}};
 }
 
+// The Legendre polynomials on [0, 1] up to degree 4. Their weighted sum is added to a quartic.
+using Values = std::array<double, 5>;
+struct Basis {
+  Values at{};         // Values of the polynomials at a sample.
+  double scale = 0.0;  // Sum of the squares of these values.
+};
+
+constexpr auto kBasis = [] {
+  std::array<Basis, kStanceSamples.size()> all;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const double x = 2.0 * kStanceSamples[i] - 1.0;
+    const double x2 = x * x;
+    all[i].at = {1.0, x, 1.5 * x2 - 0.5, (2.5 * x2 - 1.5) * x, (4.375 * x2 - 3.75) * x2 + 0.375};
+    for (const double value : all[i].at) all[i].scale += value * value;
+  }
+  return all;
+}();
+
 }  // namespace
 
 HeightRange LevellingRange(double above_m, double slack_m) {
@@ -37,24 +55,20 @@ Quartic LevellingQuartic(const std::array<double, kStanceSamples.size()>& above_
   std::array<double, kLevelSamples.size()> values;
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = Levelling(above_m[kLevelSamples[i]]);
   Quartic level = QuarticThrough(values);
-  // The added heights are a sum of the Legendre polynomials on [0, 1].
-  using Values = std::array<double, 5>;
+  std::array<double, kStanceSamples.size()> levelled_m;
+  for (std::size_t i = 0; i < levelled_m.size(); ++i) levelled_m[i] = level.At(kStanceSamples[i]);
   Values added{};
-  const auto basis = [](double u) -> Values {
-    const double x = 2.0 * u - 1.0;
-    const double x2 = x * x;
-    return {1.0, x, 1.5 * x2 - 0.5, (2.5 * x2 - 1.5) * x, (4.375 * x2 - 3.75) * x2 + 0.375};
-  };
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+  // If a sweep finds all samples within their ranges, further sweeps change nothing.
+  bool is_within = false;
+  for (int sweep = 0; sweep < kSweeps && !is_within; ++sweep) {
+    is_within = true;
     for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
-      const Values at = basis(kStanceSamples[i]);
-      double height_m = level.At(kStanceSamples[i]);
-      double scale = 0.0;
-      for (std::size_t k = 0; k < at.size(); ++k) {
-        height_m += added[k] * at[k];
-        scale += at[k] * at[k];
-      }
+      const auto& [at, scale] = kBasis[i];
+      double height_m = levelled_m[i];
+      for (std::size_t k = 0; k < at.size(); ++k) height_m += added[k] * at[k];
       const double lacking_m = std::clamp(height_m, ranges[i].min_m, ranges[i].max_m) - height_m;
+      if (lacking_m == 0.0) continue;
+      is_within = false;
       for (std::size_t k = 0; k < at.size(); ++k) added[k] += lacking_m / scale * at[k];
     }
   }
