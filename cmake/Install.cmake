@@ -15,7 +15,7 @@ foreach(part core offline protocol client)
             INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   endif()
 endforeach()
-# The shared client library needs none of the others, so its targets have a file of their own.
+# The shared client library needs none of the others, so its targets are exported to another file.
 install(TARGETS stridewire_client_shared EXPORT stridewireClientSharedTargets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT client
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})

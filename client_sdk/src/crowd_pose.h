@@ -11,7 +11,8 @@ namespace stridewire::client {
 
 /// Properties of a sampled pose.
 enum CrowdFlags : std::uint8_t {
-  /// The last received pose at or before the sampled time does not continue the pose before it.
+  /// The last received pose at or before the sampled time must not be interpolated with the pose
+  /// before it, for example because the avatar was teleported.
   kCrowdDiscontinuity = 1,
   kCrowdStanding = 2,       ///< The avatar stands and its queue is empty.
   kCrowdHeld = 4,           ///< The pose does not move, because no continuous pose follows.

@@ -24,7 +24,7 @@ struct RotationKeys {
 
 /// Interpolates `count` rotations, after negating them where necessary so that they are in one
 /// hemisphere. Normalizes the results and writes them to `out`, [joint] x y z w. The bytes do not
-/// depend on the vector width of the machine (Google Highway).
+/// depend on the vector width of the machine.
 void InterpolateRotations(const RotationKeys& keys, std::size_t count, float* out);
 
 }  // namespace stridewire::client

@@ -32,7 +32,8 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
       correction_.state = Correction::State::kNone;
       if (displayed_s_ < this->stamp(0).time_s) displayed_s_ = kNever;
     } else if (displayed_s_ > newest.time_s && correction_.state != Correction::State::kPending) {
-      // The curve after the newest pose changes, although it has been displayed.
+      // The motion after the newest pose was extrapolated and displayed, and the new pose changes
+      // it. Stores the displayed pose, from which the motion then continues.
       Vec3 root_m;
       if (Sample(displayed_s_, root_m, displayed_)) {
         correction_.state = Correction::State::kPending;

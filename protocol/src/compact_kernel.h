@@ -32,7 +32,7 @@ struct CompactWork {
   std::uint32_t* fits;     // [pose]: 1 if the pose fits the codes, otherwise 0.
 };
 
-/// Encodes a block. The bytes do not depend on the vector width of the machine (Google Highway).
+/// Encodes a block. The bytes do not depend on the vector width of the machine.
 void EncodeCompact(const CompactPlan& plan, const CompactWork& work);
 
 /// Copies the words of one pose in groups of four with non-temporal stores. `to` is aligned to 16

@@ -8,7 +8,7 @@
 namespace stridewire::protocol {
 namespace {
 
-// A builder with a larger buffer frees it after the message.
+// After a message with more bytes than this, Encode frees the builder's buffer.
 constexpr std::size_t kKeptBuilderBytes = std::size_t{1} << 20;
 
 }  // namespace

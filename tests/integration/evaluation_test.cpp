@@ -112,7 +112,7 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
       for (int tick = 0; tick < ticks; ++tick) avatar.Advance(1.0 / 60.0);
       if (avatar.movement() == nullptr) continue;
       Movement movement = *avatar.movement();
-      // Rotations without a mean.
+      // If all weights are 0, rotations have no mean.
       if (look % 6 == 5) movement.weights.assign(movement.weights.size(), 0.0f);
       std::vector<double> times_s(static_cast<std::size_t>(random.Draw(1.0, 16.99)));
       for (double& time_s : times_s) {
@@ -149,7 +149,7 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
   EXPECT_GT(sampled, 300);
 }
 
-// Difference poses of up to half a turn.
+// Tests difference poses whose rotations are up to half a turn.
 TEST(Evaluation, FadesDifferencesOfAnySize) {
   constexpr unsigned kSeed = 20261125;
   constexpr std::size_t kJoints = 37;

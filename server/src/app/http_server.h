@@ -53,7 +53,7 @@ class HttpServer {
   ~HttpServer();
 
   void AddPage(std::string path, Page page) { pages_[std::move(path)] = std::move(page); }
-  /// Sets the page for all paths that start with `prefix` and have no page of their own. It is
+  /// Sets the page for all paths that start with `prefix` and are not those of AddPage. It is
   /// called on a separate thread.
   void SetSlowPage(std::string prefix, Page page);
   /// Sets the page for all paths that have no other page.

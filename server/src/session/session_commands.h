@@ -20,8 +20,10 @@ namespace stridewire::server {
 /// The part of a session that executes the commands of its client. Each command has a sequence
 /// number and gets exactly one Reply.
 ///
-///   Handle: new --> pending: waits for shards or the main thread --> answered --> forgotten
-///              \-> answered at once (refused, or needs no other thread) --^
+///   Handle ---> pending, until shards or the main thread have replied ---> answered --> forgotten
+///          \--- refused, or needs no other thread -----------------------^
+///
+/// The Reply of a forgotten command is not stored any more (ReplyCache).
 class SessionCommands {
  public:
   SessionCommands(SessionContext& context, SessionStream& stream);

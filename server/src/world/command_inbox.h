@@ -23,7 +23,7 @@ class CommandInbox {
   void Push(WorldCommand&& command) { commands_.push_back(std::move(command)); }
 
   using Execute = std::function<CommandResult(const WorldCommand&)>;
-  /// Receives the results for shard `from_shard`.
+  /// Receives the result of a command that shard `from_shard` has posted.
   using OnResult = std::function<void(int from_shard, CommandResult&&)>;
 
   /// Executes the commands of one tick. A Spawn that takes several ticks has one result, at its

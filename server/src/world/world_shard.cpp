@@ -312,7 +312,7 @@ void WorldShard::Advance(std::uint64_t tick, int steps) {
   dropped_events_left_ = kMaxDroppedPerTick;
   ReportDropped(tick);
   steps_left_ = static_cast<std::uint16_t>(steps);
-  // The steps of missed ticks use the terrain of their own time.
+  // Steps of missed ticks use the terrain that was valid at their ticks.
   while (steps > 1 && !next_terrains_.empty() && next_terrains_.front().tick <= tick) {
     const std::uint64_t first = tick - static_cast<std::uint64_t>(steps) + 1;
     const std::uint64_t change = next_terrains_.front().tick;

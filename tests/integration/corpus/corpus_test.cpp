@@ -44,7 +44,7 @@ int CaseCount(double share) {
   return std::max(1, static_cast<int>(share * count));
 }
 
-// What the product made of a file.
+// Result of building a library from one file.
 struct Outcome {
   bool has_library = false;
   std::array<int, 2> steps{};

@@ -152,7 +152,8 @@ TEST(Decode, ChecksNumbers) {
 }
 
 TEST(Decode, RejectsAMisalignedList) {
-  // The list of doubles is aligned to 4 bytes only, for one of two lengths of the data behind it.
+  // For one of these two lengths of the data after it, the list of doubles is aligned to 4 bytes
+  // only.
   int refused = 0;
   for (const std::size_t behind : {32u, 36u}) {
     FlatBufferBuilder builder;

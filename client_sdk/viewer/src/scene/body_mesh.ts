@@ -363,7 +363,7 @@ function buildLeg(builder: MeshBuilder, parts: BodyParts, index: number, segment
   ], segments, 0.75);
 }
 
-/** Adds a round rod, for parts without a shape of their own. */
+/** Adds a round rod, for parts that need no special shape. */
 function addRod(
   builder: MeshBuilder, from: Vec, to: Vec, joint: number, r: number, region: number): void {
   const along = normalised(subtract(to, from), [0, 1, 0]);

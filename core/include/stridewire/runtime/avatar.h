@@ -110,10 +110,11 @@ struct AvatarEvent {
 
 /// Methods to continue smoothly from the previously displayed pose when a movement begins.
 enum class BlendKind : std::uint8_t {
-  /// The difference pose fades out from rest (Semancik et al., Eq. (5)). Joint velocities may jump.
+  /// The difference pose fades out with an initial velocity of zero (Semancik et al., Eq. (5)), so
+  /// joint velocities may change abruptly.
   kCubic,
-  /// The difference pose fades out from its current velocity, so joint velocities are continuous
-  /// (Bollo, "Inertialization", GDC 2018).
+  /// The difference pose starts to fade with its current velocity, so joint velocities are
+  /// continuous (Bollo, "Inertialization", GDC 2018).
   kInertialization,
 };
 

@@ -179,7 +179,8 @@ class GroupRefiner {
       if (best.report.end == RefineEnd::kErrorReached) break;
     }
     if (!is_bare && best.report.after.max_error_m > before.max_error_m) {
-      // According to other samples, no pass improved the group.
+      // Verify measures errors at other samples than the passes. Even the best pass has increased
+      // the largest error there, so the group stays unrefined.
       best.candidate = *plain;
       best.report = {.before = before,
                      .after = before,

@@ -22,7 +22,7 @@ constexpr double kStandS = 0.5;
 constexpr double kGoalM = 3.0;
 // Limits of the checks.
 constexpr double kMaxStopM = 0.03;
-// Walks that arrive end much closer to their goal than this (kArrivedM).
+// Distance to the goal at the end of a walk. It is much smaller if the walk arrives (kArrivedM).
 constexpr double kMaxGoalM = 0.05;
 constexpr double kMaxKneeDeg = 60.0;
 constexpr double kMaxSoleM = 0.01;

@@ -287,8 +287,9 @@ class Planner {
           LevellingRange(contact_sampler_.LowestSole(kStandingLate + i, moving) + base_m).max_m;
       raise_m = std::clamp(raise_m, std::min(least_m, most_m), most_m);
     }
-    // After the blend-in, the foot reaches this height before its heel rises. Corrects the height
-    // by half, unless the foot would then hover.
+    // If the blend-in ends before the release, the foot reaches its new height while its heel is
+    // still down. The foot is then lowered only by half of the correction, or by kMaxSinkM less
+    // than the correction if that is more.
     if (raise_m < 0.0 && settled == 1.0) raise_m = std::min(0.5 * raise_m, raise_m + kMaxSinkM);
     return settled_m + raise_m;
   }

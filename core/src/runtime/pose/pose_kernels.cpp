@@ -56,7 +56,8 @@ HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const*
   }
 }
 
-// Computes the rows of `Rows` movements at one grid point.
+// Computes the blended rows of several movements (`Rows`) at the same grid point. Each example is
+// read once for all of them.
 template <std::size_t Rows>
 HWY_INLINE void SumRowsOf(const float* examples, const float* const* weights, std::size_t count,
                           std::size_t row_floats, float* const* rows) {
@@ -67,7 +68,7 @@ HWY_INLINE void SumRowsOf(const float* examples, const float* const* weights, st
       SumVectors<Rows, Vectors>(examples, weights, count, row_floats, rows, i);
     }
   };
-  // Uses as many sums at a time as there are registers.
+  // Computes as many sums at a time as fit into the registers.
   if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<8>();
   if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<6>();
   take.template operator()<4>();
@@ -100,6 +101,8 @@ void BlendRows(const BlendRowsJob& run) {
   };
   const auto ring_of = [&](std::size_t i, std::size_t point)
                            HWY_ATTR { return run.ring + (i * 4 + (point & 3)) * run.row_floats; };
+  // Visits grid points in ascending order. At each point, computes the rows of all lanes that need
+  // it, and then blends the poses for which this is the last of their four points.
   std::size_t point = last;
   for (std::size_t i = 0; i < run.lanes; ++i) point = point < first_of(i) ? point : first_of(i);
   for (std::size_t left = run.lanes; left > 0; ++point) {

@@ -26,14 +26,14 @@ enum class Sender : std::uint8_t { kClient, kServer };
 /// they can hold data of a whole crowd.
 [[nodiscard]] bool IsBulk(MessageType type);
 
-/// Caps of payload sizes in bytes. The defaults are the limits of the standard. A program may use
+/// Limits of payload sizes in bytes. The defaults are those of the standard. A program may use
 /// lower ones.
 struct FrameLimits {
   std::size_t max_control_bytes = kMaxControlBytes;
   std::size_t max_bulk_bytes = kMaxBulkBytes;
 };
 
-/// Returns the cap of payloads of this type in bytes. Hello is also capped at kMaxHelloBytes.
+/// Returns the maximum payload size of this type in bytes. Hello is also limited to kMaxHelloBytes.
 [[nodiscard]] std::size_t MaxPayloadBytes(MessageType type, const FrameLimits& limits = {});
 
 /// Size of the frame header in bytes. Its fields are little-endian (STANDARD.md, "Frame"):

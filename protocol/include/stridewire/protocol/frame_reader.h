@@ -32,7 +32,7 @@ class FrameReader {
   /// errors of ReadFrameHeader. After an error every call returns the same error.
   [[nodiscard]] Expected<std::optional<FrameView>> Next(std::span<const std::byte>& bytes);
 
-  /// Sets the caps for all following frames, for example after the handshake.
+  /// Sets the limits for all following frames, for example after the handshake.
   void set_limits(const FrameLimits& limits) { limits_ = limits; }
 
   [[nodiscard]] std::size_t buffered_bytes() const { return buffer_.size(); }

@@ -138,8 +138,8 @@ TEST(LibraryBuilder, StoresTheClips) {
         EvaluateBlend(group, library->layout(), movement, t, cache, got);
         SampleClip(example.clip, t, expected);
         largest_rad = std::max(largest_rad, LargestJointAngle(got, expected));
-        // The jump of the test library takes off with a step in velocity, which sampling at 30 Hz
-        // smooths.
+        // When the jump of the test library takes off, its velocity changes abruptly. Sampling at
+        // 30 Hz smooths this change.
         ASSERT_LT(glm::length(got.root_position_m - expected.root_position_m), 0.015f);
       }
     }
