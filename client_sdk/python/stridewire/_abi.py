@@ -15,7 +15,7 @@ MAX_TERRAIN_BOXES = 65536
 MAX_PARAMETERS = 7
 MAX_WAYPOINTS = 64
 MAX_RATE_RINGS = 4
-ABI_VERSION = 7
+ABI_VERSION = 6
 
 
 class stridewire_client_options(c.Structure):
@@ -76,7 +76,6 @@ class stridewire_movement(c.Structure):
         ("interrupt", c.c_int),
         ("exact_only", c.c_uint8),
         ("allow_nearest", c.c_uint8),
-        ("unvaried", c.c_uint8),
     ]
 
 

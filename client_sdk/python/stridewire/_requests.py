@@ -23,13 +23,11 @@ class Requests:
     def step(self, avatar: int, length_m: float = 0.0, *, foot: Foot = Foot.AUTO,
              side_m: float | None = None, height_m: float = 0.0, turn_rad: float = 0.0,
              at_m: Vec3 | None = None, heading_rad: float | None = None, exact_only: bool = False,
-             allow_nearest: bool = False, unvaried: bool = False,
-             interrupt: Interrupt = Interrupt.QUEUED) -> int:
+             allow_nearest: bool = False, interrupt: Interrupt = Interrupt.QUEUED) -> int:
         """Requests a step by length, or to the place `at_m` for the ball of the foot."""
         m = _abi.stridewire_movement(avatar=avatar, type=_STEP, foot=foot, length_m=length_m,
                                      height_m=height_m, turn_rad=turn_rad, exact_only=exact_only,
-                                     allow_nearest=allow_nearest, unvaried=unvaried,
-                                     interrupt=interrupt)
+                                     allow_nearest=allow_nearest, interrupt=interrupt)
         if side_m is not None:
             m.has_side, m.side_m = 1, side_m
         if at_m is not None:

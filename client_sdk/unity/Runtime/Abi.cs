@@ -297,7 +297,6 @@ namespace Stridewire
         public Interrupt interrupt;
         public byte exact_only;
         public byte allow_nearest;
-        public byte unvaried;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -565,7 +564,7 @@ namespace Stridewire
         public const int MaxParameters = 7;
         public const int MaxWaypoints = 64;
         public const int MaxRateRings = 4;
-        public const int AbiVersion = 7;
+        public const int AbiVersion = 6;
 
         [DllImport(Library, CallingConvention = CallingConvention.Cdecl)]
         public static extern byte* stridewire_status_name(

@@ -9,8 +9,7 @@ namespace Stridewire
         /// end.</summary>
         public ulong Step(uint avatar, double lengthM, Foot foot = Foot.Auto, double? sideM = null,
                           double heightM = 0.0, double turnRad = 0.0, bool exactOnly = false,
-                          bool allowNearest = false, bool unvaried = false,
-                          Interrupt interrupt = Interrupt.Queued)
+                          bool allowNearest = false, Interrupt interrupt = Interrupt.Queued)
         {
             stridewire_movement m = MakeMovement(avatar, MovementType.Step, interrupt);
             m.length_m = lengthM;
@@ -21,15 +20,13 @@ namespace Stridewire
             m.turn_rad = turnRad;
             m.exact_only = Client.ToByte(exactOnly);
             m.allow_nearest = Client.ToByte(allowNearest);
-            m.unvaried = Client.ToByte(unvaried);
             return Request(ref m);
         }
 
         /// <summary>Requests a step that places the ball of the foot at a position.</summary>
         public ulong StepTo(uint avatar, Position at, Foot foot = Foot.Auto,
                             double? headingRad = null, bool exactOnly = false,
-                            bool allowNearest = false, bool unvaried = false,
-                            Interrupt interrupt = Interrupt.Queued)
+                            bool allowNearest = false, Interrupt interrupt = Interrupt.Queued)
         {
             stridewire_movement m = MakeMovement(avatar, MovementType.Step, interrupt);
             m.has_at = 1;
@@ -39,7 +36,6 @@ namespace Stridewire
             m.heading_rad = headingRad.GetValueOrDefault();
             m.exact_only = Client.ToByte(exactOnly);
             m.allow_nearest = Client.ToByte(allowNearest);
-            m.unvaried = Client.ToByte(unvaried);
             return Request(ref m);
         }
 

@@ -94,7 +94,6 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
           if (movement.at_m) step.at = FootprintRequest{*movement.at_m, movement.heading_rad};
           step.exact_only = movement.exact_only;
           step.allow_nearest = movement.allow_nearest;
-          step.unvaried = movement.unvaried;
           request.movement = step;
         } else if constexpr (std::is_same_v<T, protocol::JumpMovement>) {
           request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad,
@@ -132,7 +131,6 @@ protocol::RequestItem ToWire(const MovementRequest& request) {
           }
           step.exact_only = movement.exact_only;
           step.allow_nearest = movement.allow_nearest;
-          step.unvaried = movement.unvaried;
           item.movement = step;
         } else if constexpr (std::is_same_v<T, JumpRequest>) {
           item.movement = protocol::JumpMovement{movement.length_m, movement.height_m,

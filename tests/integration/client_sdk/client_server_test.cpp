@@ -13,7 +13,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -167,39 +166,6 @@ TEST(ClientAndServer, ARequestedStepIsExecuted) {
     return user.client.LatestPose(user.world, 1, pose) && !pose.missing() && pose.standing != 0;
   }));
   EXPECT_GT(pose.root_position_m[2], 1.0f);
-  EXPECT_EQ(server.Terminate(), 0);
-}
-
-TEST(ClientAndServer, UnvariedStepsAreEqual) {
-  Daemon server;
-  User user(server.port());
-  constexpr std::uint32_t kAvatars = 8;
-  user.Spawn(kAvatars);
-  const auto durations = [&](bool unvaried) {
-    std::vector<stridewire_movement> steps;
-    for (std::uint32_t a = 1; a <= kAvatars; ++a) {
-      const stridewire_movement step = client::Step(a, 100 * a + unvaried, 0.6);
-      steps.push_back(unvaried ? client::Unvaried(step) : step);
-    }
-    EXPECT_TRUE(user.client.Request(user.world, steps));
-    std::map<std::uint32_t, std::uint64_t> started;
-    std::set<std::uint64_t> ticks;
-    EXPECT_TRUE(Eventually([&, finished = 0u]() mutable {
-      for (stridewire_event event; user.client.PollEvent(event);) {
-        if (event.request_id != 100 * event.avatar + unvaried) continue;
-        if (event.type == STRIDEWIRE_EVENT_STARTED) started[event.avatar] = event.tick;
-        if (event.type != STRIDEWIRE_EVENT_FINISHED) continue;
-        ticks.insert(event.tick - started[event.avatar]);
-        ++finished;
-      }
-      return finished == kAvatars;
-    }));
-    return ticks;
-  };
-  EXPECT_EQ(durations(true).size(), 1u);
-  EXPECT_GT(durations(false).size(), 1u);
-  EXPECT_EQ(user.client.Request(user.world, {client::Unvaried(client::Stand(1, 7, 1.0))}).status(),
-            STRIDEWIRE_INVALID_ARGUMENT);
   EXPECT_EQ(server.Terminate(), 0);
 }
 

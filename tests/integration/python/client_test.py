@@ -166,8 +166,6 @@ class Live(unittest.TestCase):
             world.cancel(avatar)
             self.assertEqual(world.wait(stand).outcome, Outcome.CANCELLED)
             self.assertEqual(world.wait(walk).outcome, Outcome.CANCELLED)
-            step = world.step(avatar, 0.5, unvaried=True)
-            self.assertEqual(world.wait(step).outcome, Outcome.COMPLETED)
             jump = world.jump(avatar, 0.5, allow_nearest=True)
             world.teleport(avatar, (5.0, 0.0, 5.0))
             self.assertEqual(world.wait(jump).outcome, Outcome.CANCELLED)

@@ -10,7 +10,7 @@
 #define OFFSET(type, field, bytes) \
   _Static_assert(offsetof(type, field) == (bytes), "offset of " #type "." #field)
 
-_Static_assert(STRIDEWIRE_ABI_VERSION == 7, "the numbers below belong to this version");
+_Static_assert(STRIDEWIRE_ABI_VERSION == 6, "the numbers below belong to this version");
 
 #if UINTPTR_MAX == UINT64_MAX
 
@@ -62,7 +62,6 @@ OFFSET(stridewire_movement, speed_m_s, 128);
 OFFSET(stridewire_movement, interrupt, 136);
 OFFSET(stridewire_movement, exact_only, 140);
 OFFSET(stridewire_movement, allow_nearest, 141);
-OFFSET(stridewire_movement, unvaried, 142);
 
 SIZE(stridewire_height_field, 40);
 OFFSET(stridewire_height_field, origin_m, 0);

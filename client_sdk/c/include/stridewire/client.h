@@ -51,7 +51,7 @@ extern "C" {
 #endif
 
 /// Version of the struct layouts in this header. stridewire_client_create rejects other versions.
-#define STRIDEWIRE_ABI_VERSION 7
+#define STRIDEWIRE_ABI_VERSION 6
 
 /// Returns the version of the library, for example "0.1.0".
 const char* stridewire_version(void);
@@ -283,9 +283,6 @@ typedef struct stridewire_movement {
   /// rejects the request if its place would be missed by more than 0.2 m, or its direction or
   /// heading by more than 60 degrees.
   uint8_t allow_nearest;
-  /// Step: 1 plays the step without the variation of strides that the server adds, so that equal
-  /// steps are equal.
-  uint8_t unvaried;
 } stridewire_movement;
 
 /// Requests movements. An avatar may appear several times and executes its movements in order.

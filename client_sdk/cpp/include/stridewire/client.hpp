@@ -82,11 +82,6 @@ inline stridewire_movement AllowNearest(stridewire_movement movement) {
   movement.allow_nearest = 1;
   return movement;
 }
-/// Changes a step request so that the step does not vary.
-inline stridewire_movement Unvaried(stridewire_movement step) {
-  step.unvaried = 1;
-  return step;
-}
 /// Changes a request so that it interrupts the current movement and drops the queue.
 inline stridewire_movement Now(stridewire_movement movement) {
   movement.interrupt = STRIDEWIRE_NOW;

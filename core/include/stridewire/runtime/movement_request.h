@@ -52,8 +52,6 @@ struct StepRequest {
   /// True: the avatar plays the nearest step of the library, however far it is from the request.
   /// False: the step is rejected if its errors exceed kMaxRequestErrorM or kMaxRequestErrorRad.
   bool allow_nearest = false;
-  /// Plays the step without AvatarOptions::stride_variation.
-  bool unvaried = false;
 };
 
 struct JumpRequest {

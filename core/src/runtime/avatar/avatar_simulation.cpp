@@ -421,8 +421,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   StepRequest step = std::get<StepRequest>(request.movement);
   if (!step.at) {
     if (options_.terrain != nullptr && body_.plants_feet) step.height_m = RiseAhead(step);
-    auto plan = PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
-    if (plan && step.unvaried) plan->is_varied = false;
+    const auto plan = PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
     if (!plan || !step.exact_only || !body_.plants_feet) return plan;
     step.foot = MovingFoot(body_.library->group(plan->group).kind);
     step.at = FootprintOf(step);
@@ -443,7 +442,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   auto plan = PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
                             base_.heading_rad, feet_, FootprintUse::kRequested);
   // The whole pose determines whether a leg reaches a footprint, so such a step must not be varied.
-  if (plan) plan->is_varied = !step.exact_only && !step.unvaried;
+  if (plan) plan->is_varied = !step.exact_only;
   return plan;
 }
 
