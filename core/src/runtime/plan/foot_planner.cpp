@@ -24,6 +24,14 @@ constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
 constexpr double kMaxRootSinkM = 0.3;
 // Largest shift of the root towards the centre between the feet.
 constexpr double kMaxCentreShiftM = 0.1;
+// A leg whose foot descends by kFullDescentM or more lands with at most kDescentExtension of its
+// length, so that its knee is still bent. If it descends less, the limit is between this and
+// kLongestExtension. A knee that is nearly straight turns abruptly while the foot falls. The limit
+// holds from kBentLanding (fraction of the swing) on.
+constexpr double kDescentExtension = 0.97;
+constexpr double kFullDescentM = 0.15;
+constexpr double kBentLanding = 0.85;
+constexpr double kLeastShare = 0.8;
 
 // Maximum sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
@@ -435,19 +443,26 @@ class Planner {
   // lower it abruptly just before the foot lands on a lower tread.
   double RootSink(Foot moving) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
+    const double descent_m = trajectory.from.position_m.y - trajectory.to.position_m.y;
+    const double descent = std::clamp(descent_m / kFullDescentM, 0.0, 1.0);
+    const double bent = kLongestExtension + descent * (kDescentExtension - kLongestExtension);
     double sink_m = 0.0;
     for (const double part : kSinkSamples) {
       const double time_s =
           trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
       const double share = RootSinkShare(time_s / movement_.duration_s());
-      sink_m = std::max(sink_m, MissingReach(time_s) / share);
+      sink_m = std::max(sink_m, MissingReach(time_s, moving, kLongestExtension) / share);
+      // If the foot lands long before the end of the movement, the root descends further after the
+      // landing. A bent knee is only a preference, so it does not increase this descent as much.
+      if (part < kBentLanding) continue;
+      sink_m = std::max(sink_m, MissingReach(time_s, moving, bent) / std::max(share, kLeastShare));
     }
     return std::min(sink_m, kMaxRootSinkM);
   }
 
   // Returns by how much planting would lower the root at this time, so that both legs reach their
-  // targets.
-  double MissingReach(double time_s) {
+  // targets. The leg of `moving` may extend to `extension` of its length.
+  double MissingReach(double time_s, Foot moving, double extension) {
     EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
     std::array<LegPose, 2> legs;
     FeetAt blended;
@@ -462,8 +477,11 @@ class Planner {
       const Vec3& hip = legs[f].positions_m[static_cast<std::size_t>(side.hip)];
       const Vec3& ankle = legs[f].positions_m[static_cast<std::size_t>(side.ankle)];
       const double length_m = static_cast<double>(side.thigh_m) + side.shank_m;
-      const double allowed_m = std::clamp(static_cast<double>(glm::length(ankle - hip)),
-                                          kEasyExtension * length_m, kLongestExtension * length_m);
+      double allowed_m = std::clamp(static_cast<double>(glm::length(ankle - hip)),
+                                    kEasyExtension * length_m, kLongestExtension * length_m);
+      if (f == static_cast<std::size_t>(moving)) {
+        allowed_m = std::min(allowed_m, extension * length_m);
+      }
       const DVec3 at = blended[f].ball_m + corrections.feet[f].offset_m +
                        DVec3(TurnOf(corrections.feet[f]) * (ankle - legs[f].ball_m));
       const DVec3 reach = at - (DVec3(pose_.root_position_m) + corrections.root_m + DVec3(hip));
