@@ -283,6 +283,7 @@ void Connection::BeginLinger() {
 
 void Connection::Close() {
   if (is_closed_) return;
+  const auto self = shared_from_this();  // Close may end the last operation that keeps it alive.
   is_closed_ = true;
   timer_.cancel();
   transport_->Close();

@@ -106,7 +106,7 @@ class Transport {
   /// Closes the sending direction after the last Send. The user continues to receive until the peer
   /// has closed, too. Returns false if the socket is already broken.
   [[nodiscard]] virtual bool End(std::shared_ptr<User> user, CloseCode code) = 0;
-  /// Closes the socket at once.
+  /// Closes the socket at once. Pending operations fail, some of them before Close returns.
   virtual void Close() = 0;
 
   // Detach and Attach move the transport to the io_context of another thread. No operation may be

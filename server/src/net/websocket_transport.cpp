@@ -1,6 +1,8 @@
 #include "net/websocket_transport.h"
 
+#include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/beast/websocket.hpp>
 #include <optional>
 #include <string>
@@ -59,14 +61,16 @@ class WebSocketTransport final : public Transport {
     }
     stream_.async_read_some(
         asio::buffer(buffer.data(), buffer.size()),
-        [this, user = std::move(user), buffer](const error_code& error, std::size_t bytes) {
-          if (error == websocket::condition::protocol_violation) {
-            stream_.next_layer().traffic().ProtocolError();
-          }
-          user->OnReceived(error, {.bytes = buffer.first(bytes),
-                                   .ends_message = !error && stream_.is_message_done(),
-                                   .is_text = !error && stream_.got_text()});
-        });
+        asio::bind_cancellation_slot(
+            stop_reading_.slot(),
+            [this, user = std::move(user), buffer](const error_code& error, std::size_t bytes) {
+              if (error == websocket::condition::protocol_violation) {
+                stream_.next_layer().traffic().ProtocolError();
+              }
+              user->OnReceived(error, {.bytes = buffer.first(bytes),
+                                       .ends_message = !error && stream_.is_message_done(),
+                                       .is_text = !error && stream_.got_text()});
+            }));
   }
 
   bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
@@ -80,17 +84,29 @@ class WebSocketTransport final : public Transport {
   void KeepAlive(std::shared_ptr<User> user) override {
     if (request_ || is_pinging_) return;
     is_pinging_ = true;
-    stream_.async_ping({},
-                       [this, user = std::move(user)](const error_code&) { is_pinging_ = false; });
+    stream_.async_ping(
+        {}, asio::bind_cancellation_slot(
+                stop_pinging_.slot(),
+                [this, user = std::move(user)](const error_code&) { is_pinging_ = false; }));
   }
 
   bool End(std::shared_ptr<User> user, CloseCode code) override {
     // The pending Receive reports the answer of the peer.
     stream_.async_close(websocket::close_reason(static_cast<std::uint16_t>(code)),
-                        [user = std::move(user)](const error_code&) {});
+                        asio::bind_cancellation_slot(
+                            stop_ending_.slot(), [user = std::move(user)](const error_code&) {}));
     return true;
   }
-  void Close() override { stream_.next_layer().Close(); }
+
+  void Close() override {
+    stream_.next_layer().Close();
+    // Closing the socket ends only operations that use it. If an invalid frame arrives while a close
+    // frame is being sent, Beast lets the read and the close wait for each other, so both would keep
+    // their user for ever.
+    for (auto* stop : {&stop_reading_, &stop_pinging_, &stop_ending_}) {
+      stop->emit(asio::cancellation_type::terminal);
+    }
+  }
   void Detach() override { stream_.next_layer().Detach(); }
   bool Attach(asio::io_context& context) override { return stream_.next_layer().Attach(context); }
 
@@ -109,6 +125,11 @@ class WebSocketTransport final : public Transport {
         });
   }
 
+  // These cancel pending operations. They are declared before the stream, because operations that it
+  // still holds when it is destroyed refer to them.
+  asio::cancellation_signal stop_reading_;
+  asio::cancellation_signal stop_pinging_;
+  asio::cancellation_signal stop_ending_;
   websocket::stream<PortableSocket> stream_;
   std::optional<UpgradeRequest> request_;  // Set until the request has been answered.
   std::span<const SharedFrame> unsent_;
