@@ -76,15 +76,17 @@ void Shard::CloseConnections() {
   STRIDEWIRE_CHECK(!thread_.joinable());
   tick_timer_.cancel();
   housekeeping_timer_.cancel();
-  for (const auto& weak : connections_) {
-    if (const auto connection = weak.lock()) {
-      connection->set_handler(nullptr);
-      connection->Close();
-    }
-  }
-  // The pending read of a closed WebSocket belongs to the io_context in which it was created.
+  // The pending read of a closed WebSocket belongs to the io_context in which it was created. A
+  // connection that was adopted while handlers ran is closed in the next round.
   context_.restart();
-  context_.poll();
+  do {
+    for (const auto& weak : connections_) {
+      if (const auto connection = weak.lock()) {
+        connection->set_handler(nullptr);
+        connection->Close();
+      }
+    }
+  } while (context_.poll() > 0);
 }
 
 // ---- ticks
