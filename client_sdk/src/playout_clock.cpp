@@ -11,7 +11,7 @@ void PlayoutClock::Start(double local_s, double offset_s) {
   first_ = count_ = 0;
   ready_ = true;
   stalled_ = false;
-  first_local_s_ = last_on_time_s_ = local_s;
+  first_local_s_ = last_on_time_s_ = last_short_s_ = local_s;
   first_offset_s_ = smallest_s_ = offset_s;
   offset_s_ = target_s_ = offset_s + std::max(kFirstDelayS, (1.0 + kMargin) * interval_s_);
 }
@@ -78,7 +78,11 @@ bool PlayoutClock::AddSample(double local_s, double server_s, double interval_s)
   if (local_s - first_local_s_ < kWindowS) {
     target_s_ = std::max(target_s_, first_offset_s_ + kFirstDelayS);
   }
-  if (local_s - last_on_time_s_ > kResyncS && target_s_ - offset_s_ > kSnapS) {
+  if (offset_s_ - target_s_ <= kMaxExcessS) last_short_s_ = local_s;
+  if (local_s - last_short_s_ > kResyncS) {
+    Start(local_s, offset_s);
+    jumped = true;
+  } else if (local_s - last_on_time_s_ > kResyncS && target_s_ - offset_s_ > kSnapS) {
     offset_s_ = target_s_;
     last_on_time_s_ = local_s;
     jumped = true;

@@ -14,8 +14,9 @@ namespace stridewire::client {
 ///   the kQuantile-quantile of the offsets of the last kWindowS + (1 + kMargin) * interval
 ///
 /// d approaches the target at a rate of at most kMaxRate, so the display runs at most 5 % faster or
-/// slower than the server. It jumps only if the server's clock has changed, or if all messages of
-/// the last kResyncS arrived too late by more than kSnapS.
+/// slower than the server. It jumps only if the server's clock has changed, if all messages of the
+/// last kResyncS arrived too late by more than kSnapS, or if d has exceeded its target by more than
+/// kMaxExcessS for kResyncS.
 ///
 /// No delay can cover a stall of the link. The messages that arrive after a stall are therefore
 /// ignored until they are on time again.
@@ -41,6 +42,8 @@ class PlayoutClock {
   /// If an offset is smaller than all others in the window by more than this, the server's clock
   /// has changed, or the local clock was stopped.
   static constexpr double kSnapS = 0.25;
+  /// Without a jump, such an excess would take 20 times as long to disappear.
+  static constexpr double kMaxExcessS = 0.5;
 
   /// Adds a message with poses of server time `server_s` that arrived at `local_s`. The stream has
   /// the interval `interval_s`. Local times never decrease. Returns true if the displayed time
@@ -81,6 +84,7 @@ class PlayoutClock {
   double smallest_s_ = 0.0;  ///< Smallest offset in the window.
   double stalled_since_s_ = 0.0;
   double last_on_time_s_ = 0.0;  ///< Local time of the last message that was not too late.
+  double last_short_s_ = 0.0;    ///< Local time at which `d` last exceeded its target by little.
   double last_local_s_ = 0.0;
   double at_local_s_ = 0.0;  ///< Local time for which `offset_s_` is valid.
   double offset_s_ = 0.0;    ///< d

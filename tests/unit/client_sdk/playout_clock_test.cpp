@@ -56,6 +56,22 @@ TEST(PlayoutClock, JumpsToAnotherClock) {
   EXPECT_NEAR(clock.DisplayTime(6.0), 100.0 - PlayoutClock::kFirstDelayS, 1e-9);
 }
 
+// For example, a debugger has stopped the client, which then needs seconds to read what has arrived.
+TEST(PlayoutClock, ReturnsToThePresentAfterABacklog) {
+  PlayoutClock clock;
+  Add(clock, 0.0, 6.0, 0.05);
+  // The messages of 11 s arrive within 3 s.
+  constexpr double kPauseS = 11.0;
+  constexpr double kReadS = 3.0;
+  for (double server_s = 6.0; server_s < 6.0 + kPauseS; server_s += kIntervalS) {
+    const double share = (server_s - 6.0) / kPauseS;
+    clock.AddSample(6.0 + kPauseS - kReadS + share * kReadS + 0.05, server_s, kIntervalS);
+  }
+  EXPECT_GT(Delay(clock, 17.05), 1.0);  // Old poses are displayed instead of none.
+  EXPECT_EQ(Add(clock, 17.06, 19.0, 0.05), 1);
+  EXPECT_LT(Delay(clock, 19.0), 0.05 + 1.25 * kIntervalS + PlayoutClock::kMaxExcessS);
+}
+
 TEST(PlayoutClock, NeverRunsMoreThanFivePercentFasterOrSlower) {
   const std::uint64_t seed = 3;
   SCOPED_TRACE(testing::Message() << "seed " << seed);
