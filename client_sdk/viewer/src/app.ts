@@ -49,7 +49,7 @@ const panelUpdateIntervalMs = 250;
 const serverInfoIntervalMs = 4000;
 /** Part of the recording that the playback slider covers, in seconds. */
 const playbackRangeS = 20;
-/** The selection ends when its avatar has not been drawn for this time. */
+/** The selection ends when its avatar has been missing from the world for this time. */
 const selectionTimeoutMs = 3000;
 /** Time for which a message is shown over the scene. */
 const toastMs = 8000;
@@ -567,7 +567,7 @@ export class App {
     this.lastSelectionCheckMs = nowMs;
     const {selected} = this;
     if (!selected) return true;
-    if (!this.playback.live || selected.pane.view.indexOf(selected.avatar) >= 0) {
+    if (!this.playback.live || selected.pane.world.avatars().includes(selected.avatar)) {
       this.missingMs = 0;
     } else if (this.missingMs > selectionTimeoutMs) {
       this.select(null, 0);
