@@ -41,7 +41,8 @@ void SessionCommands::Pump() {
       ++commands_resent_;
     } else {
       // The command was encoded before, so this fails only if the server has lowered its limits.
-      // The server then reports the gap.
+      // When the server receives the next command, it closes the connection, because a sequence
+      // number is missing.
       last_text_ = Describe(status.error());
     }
   }

@@ -27,7 +27,7 @@ struct LoadReport {
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
   std::uint64_t seed = 0;
   double seconds = 0.0;              ///< Duration of the measurement.
-  std::uint64_t poses_received = 0;  ///< Poses that all observers received at measured ticks.
+  std::uint64_t poses_received = 0;  ///< Poses received at measured ticks, summed over observers.
   /// Expected poses: observed avatars times measured ticks, summed over all observers.
   std::uint64_t poses_expected = 0;
   std::uint64_t poses_invalid = 0;     ///< Received poses that failed a check.

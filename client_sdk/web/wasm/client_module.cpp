@@ -3,8 +3,9 @@
 // Messages are passed as frames (protocol/STANDARD.md). To send a command, the web client writes
 // its frame to the memory of `input`. To handle a received message, it first passes the frame to
 // `on_frame`, which verifies it, and then reads the fields from the frame. Numbers that a function
-// returns besides its result are in `results`; the comment of each function describes them. A text
-// has results[kTextBytes] bytes and begins at address results[kTextAt].
+// returns besides its result are in `results`; the comment of each function lists them after
+// "results:", each with its index. A text has results[kTextBytes] bytes and begins at address
+// results[kTextAt].
 
 #include <algorithm>
 #include <array>
@@ -406,7 +407,8 @@ void OnLost(Client* client, stridewire_status status, std::size_t bytes, double 
 STRIDEWIRE_EXPORT(advance) void Advance(Client* client, double now_s) {
   client->session.AdvanceTime(now_s);
 }
-/// Moves pending frames to the output and returns their size. results: 0 their address.
+/// Moves the frames to send to Client::output and returns their size in bytes. results: 0 the
+/// address of the frames.
 STRIDEWIRE_EXPORT(take_output) std::size_t TakeOutput(Client* client) {
   if (!client->session.TakeOutput(client->output)) return 0;
   results[0] = Address(client->output);

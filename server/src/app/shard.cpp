@@ -167,7 +167,8 @@ void Shard::Publish() {
     }
     PublishPoses(*world);
   }
-  // The shard's own outbox is posted as well, because sending is not part of the tick.
+  // The outbox of this shard is posted as well instead of being handled here, so that the shard
+  // sends the messages after the tick and ticks do not become longer.
   for (auto& [shard, outbox] : std::exchange(outboxes_, {})) {
     shards_.at(static_cast<std::size_t>(shard))->Post(std::move(outbox));
   }

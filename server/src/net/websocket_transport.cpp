@@ -100,9 +100,9 @@ class WebSocketTransport final : public Transport {
 
   void Close() override {
     stream_.next_layer().Close();
-    // Closing the socket ends only operations that use it. If an invalid frame arrives while a close
-    // frame is being sent, Beast lets the read and the close wait for each other, so both would keep
-    // their user for ever.
+    // Closing the socket ends only operations that use it. If an invalid frame arrives while a
+    // close frame is being sent, the read and the close of Beast wait for each other without using
+    // the socket, and would never release their `user`.
     for (auto* stop : {&stop_reading_, &stop_pinging_, &stop_ending_}) {
       stop->emit(asio::cancellation_type::terminal);
     }
@@ -125,8 +125,8 @@ class WebSocketTransport final : public Transport {
         });
   }
 
-  // These cancel pending operations. They are declared before the stream, because operations that it
-  // still holds when it is destroyed refer to them.
+  // These signals cancel pending operations. They are declared before the stream, so that they are
+  // destroyed after it: operations that are pending when the stream is destroyed refer to them.
   asio::cancellation_signal stop_reading_;
   asio::cancellation_signal stop_pinging_;
   asio::cancellation_signal stop_ending_;

@@ -394,7 +394,8 @@ void SessionCommands::Execute(protocol::SetPlanting&& command) {
 void SessionCommands::Execute(protocol::SetTerrain&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr) return;
-  // The cost of validating and sending a terrain, in items.
+  // Heights and boxes of the terrain. They determine the cost of validating and sending it, which
+  // is counted in items.
   std::size_t numbers = 0;
   if (command.terrain) {
     numbers = command.terrain->boxes.size();

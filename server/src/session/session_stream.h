@@ -102,7 +102,8 @@ class SessionStream {
 
   /// Applies changed subscriptions to the movement feeds of a world.
   void UpdateMovementFeeds(const std::shared_ptr<World>& world);
-  /// Requests missing states if the send queue has room.
+  /// If the send queue has room, requests from the shards the states of avatars that the movement
+  /// feeds still lack.
   void RequestStates();
   /// Sends the terrain of a world. Flat ground is sent only if `even_if_flat`.
   void SendTerrain(const World& world, bool even_if_flat);

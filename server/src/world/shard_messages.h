@@ -152,8 +152,8 @@ struct RegionFilter {
   bool operator==(const RegionFilter&) const = default;
 };
 
-/// Intervals at which poses are sent, in ticks: they are sent in every tick that the interval
-/// divides. 0: never.
+/// Intervals at which poses are sent, in ticks. Poses are sent in ticks whose number is a multiple
+/// of the interval. 0: never.
 struct SendInterval {
   std::uint16_t all = 0;     ///< Interval for sessions that observe all avatars.
   std::uint16_t subset = 0;  ///< Interval for sessions that observe selected avatars or a region.

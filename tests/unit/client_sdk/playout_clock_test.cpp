@@ -56,7 +56,8 @@ TEST(PlayoutClock, JumpsToAnotherClock) {
   EXPECT_NEAR(clock.DisplayTime(6.0), 100.0 - PlayoutClock::kFirstDelayS, 1e-9);
 }
 
-// For example, a debugger has stopped the client, which then needs seconds to read what has arrived.
+// For example, a debugger has stopped the client, which then needs seconds to read what has
+// arrived.
 TEST(PlayoutClock, ReturnsToThePresentAfterABacklog) {
   PlayoutClock clock;
   Add(clock, 0.0, 6.0, 0.05);

@@ -42,7 +42,7 @@ function follow(view: DataView, at: number): number {
   return at === 0 ? 0 : at + view.getUint32(at, true);
 }
 
-/** Reads the table at `at`. All fields of an absent table, at 0, are absent. */
+/** Reads the table at `at`. If `at` is 0, the table is absent, and so are all of its fields. */
 function readTable(view: DataView, at: number, info: TableInfo): unknown {
   if (info.alone) return readField(view, fieldAt(view, at, 0), info.fields[0]!);
   const table: {[name: string]: unknown} = {};

@@ -9,9 +9,9 @@
 
 namespace stridewire::builtin {
 
-/// The motion of the pelvis in a step. Its height is given by the states at both ends, and higher
-/// in between. It is then lowered smoothly where a leg could not reach the ground with a slightly
-/// bent knee.
+/// The motion of the pelvis in a step. The gait states at both ends of the step determine its
+/// height there. Between the ends it is higher. Where a leg could not reach the ground with a
+/// slightly bent knee, the pelvis is lowered smoothly.
 class PelvisPath {
  public:
   PelvisPath(Foot moving, const StepTiming& timing, const FootPaths& feet);

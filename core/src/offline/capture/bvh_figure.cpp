@@ -73,7 +73,8 @@ class FigureBuilder {
         if (first_error) first_error = std::unexpected(std::move(legs.error()));
         continue;
       }
-      // Names identify legs more reliably than their shape.
+      // The first figure is selected, unless only a later one has joint names that identify its
+      // legs. Names are more reliable than shapes.
       if (figures++ > 0 && (legs->by_shape || !figure_.legs.by_shape)) continue;
       selected = static_cast<int>(r);
       figure_.legs = *legs;

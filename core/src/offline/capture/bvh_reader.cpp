@@ -29,10 +29,12 @@ namespace {
 constexpr double kStandingHipsM = 0.95;  // Hip height of a standing adult.
 constexpr double kSlowestFeetMS2 = 6.0;  // See NoteSlowMotion.
 constexpr double kMinTravelM = 0.15;
-// Largest distance of a joint of the body from its mean position. The mean becomes the offset of
-// the joint, so larger distances are rejected.
+// If a file animates the positions of joints, the mean of a joint's positions relative to its
+// parent becomes its offset. A joint of the body may be this far from the mean; otherwise the file
+// is rejected.
 constexpr double kMaxDeviationM = 0.02;
-// A joint carries the body if a chain of bones below it is at least this long, in leg lengths.
+// Joints of the body are those of the legs, and those above a chain of bones of at least this
+// length, in leg lengths.
 constexpr double kBodyShare = 0.25;
 
 struct KnownUnit {

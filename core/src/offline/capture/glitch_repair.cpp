@@ -17,7 +17,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kJumpRadPerS = 1800.0 * kDegree;
 // Smaller rotations are noise of captures at 240 Hz and above, not glitches.
 constexpr double kJumpMinRad = 12.0 * kDegree;
-// Larger rotations per frame are always glitches. At 30 Hz, 1800 degrees/s would be too permissive.
+// Larger rotations per frame are always glitches. Below 30 Hz, kJumpRadPerS alone would permit
+// them.
 constexpr double kJumpMaxRad = 60.0 * kDegree;
 constexpr double kSpikeS = 0.04;
 constexpr double kSpreadS = 0.08;

@@ -134,7 +134,8 @@ void ReadWeights(const MotionLibrary& library, bool plants_feet, Movement& movem
   }
 }
 
-// Rejects playback speeds that no avatar uses, because keytimes are divided by the speed.
+// Rejects playback speeds that no avatar uses. Keytimes are divided by the speed, so 0 or NaN would
+// make them invalid.
 template <typename Reader>
 void CheckRate(double rate, Reader& reader) {
   if (!(rate >= kMinRate && rate <= kMaxRate)) {

@@ -167,7 +167,8 @@ class AvatarSimulation {
   /// nor changes. In this case, time_s(), revision(), movement_time_s() and idle() are in one cache
   /// line.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
-  /// Prefetches that cache line, for callers that check many avatars.
+  /// Prefetches the cache line that contains the values listed at is_event_free(), for callers that
+  /// check many avatars.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
   /// The kStarted event of the current movement or requested stand. Null if the avatar stands
   /// without a request.

@@ -56,7 +56,8 @@ constexpr double kMinLandingWidthM = 0.05;
 constexpr double kPassingLengthM = 0.2;
 constexpr double kCrossingWidthM = 0.04;
 constexpr double kMaxPushM = 0.08;
-// Fractions of the swing and of the stance at which feet are sampled.
+// Fractions of the swing at which the moving foot is sampled: shortly after its release, and in the
+// middle of the swing.
 constexpr std::array<double, 2> kEarlySamples{0.1, 0.18};
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 

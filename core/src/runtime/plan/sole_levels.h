@@ -45,8 +45,9 @@ struct HeightRange {
 /// Returns by how much a sole that is `above_m` above the ground must be raised.
 [[nodiscard]] double Levelling(double above_m);
 
-/// Returns heights that keep a sole on the ground during a stance. `above_m` are the heights of the
-/// sole above the ground at kStanceSamples. `ranges` are the heights that may be added there.
+/// Returns a curve of heights over a stance that keep a sole on the ground if they are added to the
+/// heights of the foot. `above_m` are the heights of the sole above the ground at kStanceSamples
+/// without the curve, and `ranges` limit the curve at these samples.
 [[nodiscard]] Quartic LevellingQuartic(
     const std::array<double, kStanceSamples.size()>& above_m,
     const std::array<HeightRange, kStanceSamples.size()>& ranges);

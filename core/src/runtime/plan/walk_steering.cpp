@@ -285,7 +285,8 @@ bool WalkSteering::PreferFootBehind(const Body& body, std::size_t next_waypoint)
   const double left_ahead_m =
       RotateYaw(-body.heading_rad, At(Foot::kLeft).position_m - At(Foot::kRight).position_m).z;
   if (std::fabs(left_ahead_m) <= kFeetApartForwardM) return false;
-  // An avatar turns before it walks, so only side steps lead backward.
+  // An avatar turns towards its goal before it walks forward. It therefore moves backward only
+  // where it prefers side steps.
   const bool is_backward =
       PrefersSideSteps(body, is_last_leg) &&
       RotateYaw(-body.heading_rad, approach_.position_m - body.position_m).z < -kFeetApartForwardM;

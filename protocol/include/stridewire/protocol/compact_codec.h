@@ -113,8 +113,8 @@ class CompactCodec {
 
    private:
     friend class CompactCodec;
-    // One of the numbers of a pose, for all poses of a block. Aligned to a cache line, so that no
-    // vector crosses two lines.
+    // One component of the poses, for all poses of a block. The alignment prevents SIMD loads and
+    // stores that cross cache lines.
     struct alignas(64) Floats {
       float of[kBlock];
     };
