@@ -135,8 +135,8 @@ class GameServer {
     spawned_ = static_cast<bool>(client_.Spawn(world_, spawns));
   }
 
-  // Returns the turns of `steps` steps: random ones, or towards the start if the avatar is too far
-  // away.
+  // Returns the turn per step of a walk of `steps` steps: a random one, or one towards the start if
+  // the avatar is too far away.
   double Turn(const stridewire_event& event, int steps) {
     const double x = 0.75 * (settings_.avatars - 1) - event.base_position_m[0];
     const double z = -event.base_position_m[2];
@@ -148,7 +148,8 @@ class GameServer {
     return std::clamp(turn_rad / steps, -settings_.turn_rad, settings_.turn_rad);
   }
 
-  // Requests movements for the avatar of an event, which is idle at the base frame of the event.
+  // Requests movements for the avatar of an event. The avatar is idle, and `event` contains its
+  // base frame.
   void RequestMovements(const stridewire_event& event) {
     const std::uint32_t avatar = event.avatar;
     if (!IsOurs(avatar)) return;

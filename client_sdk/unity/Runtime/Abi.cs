@@ -141,7 +141,7 @@ namespace Stridewire
         ConnectFailed = 1,
         /// <summary>Uses status, text. The client reconnects.</summary>
         ConnectionLost = 2,
-        /// <summary>The server has no session of this client any more.</summary>
+        /// <summary>The server no longer has the session of this client.</summary>
         SessionLost = 3,
         /// <summary>Uses status, text. The client does not try again.</summary>
         Closed = 4,

@@ -1,8 +1,9 @@
 import {native} from './native';
 
 /**
- * Status codes, the same as in stridewire/client.h. The hundreds state who can correct the problem:
- * 1xx the caller, 2xx the author of the data, 3xx the network, 4xx the operator of the server.
+ * Status codes, the same as in stridewire/status.h. The first digit states who can correct the
+ * problem: 1xx the caller, 2xx the author of the data, 3xx the network, 4xx the operator of the
+ * server.
  * Codes x00 to x49 belong to the protocol; codes x50 to x99 come only from client libraries.
  */
 export const Status = {

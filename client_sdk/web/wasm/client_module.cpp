@@ -452,7 +452,7 @@ std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes)
   return Report(*client, status, command);
 }
 
-/// results: the numbers in the order in which they are written here, starting at 0 and at 16.
+/// results: the array `playout` from index 0 on, and the array `numbers` from index 16 on.
 STRIDEWIRE_EXPORT(statistics) void Statistics(Client* client, double now_s) {
   const stridewire_statistics s = client->session.Statistics();
   const double numbers[] = {

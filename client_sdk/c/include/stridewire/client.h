@@ -459,7 +459,7 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_CONNECTED = 0,
   STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< Uses status, text. The client tries again.
   STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< Uses status, text. The client reconnects.
-  STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server has no session of this client any more.
+  STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server no longer has the session of this client.
   STRIDEWIRE_EVENT_CLOSED = 4,           ///< Uses status, text. The client does not try again.
   /// Uses world. The skeleton is available. Repeated after SESSION_LOST.
   STRIDEWIRE_EVENT_WORLD_JOINED = 5,
@@ -580,9 +580,9 @@ typedef struct stridewire_event {
   /// ACCEPTED: the walking speed of the library that is closest to the requested one. End of a
   /// walk: its mean speed without the first and the last steps. 0: unknown.
   double speed_m_s;
-  /// How the request ended. Every request that the server has accepted has exactly one event in
-  /// which it is not NONE, and no event after it. Exceptions are a lost session, and events that a
-  /// client that reads too slowly loses (LAGGING, `events_dropped_before`).
+  /// How the request ended. The last event of every accepted request contains its outcome; all
+  /// other events contain NONE. The application may miss the last event if the session is lost, or
+  /// if it reads events too slowly (LAGGING, `events_dropped_before`).
   stridewire_outcome outcome;
 } stridewire_event;
 

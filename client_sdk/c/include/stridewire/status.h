@@ -5,10 +5,10 @@
 extern "C" {
 #endif
 
-/// Result of a call or command. The hundreds state who can correct the problem: 1xx the caller, 2xx
-/// the author of the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49 also
-/// occur in the protocol, codes x50 to x99 only in this library. Future versions may add codes, so
-/// handle an unknown code by its hundreds.
+/// Result of a call or command. The first digit states who can correct the problem: 1xx the caller,
+/// 2xx the author of the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49
+/// also occur in the protocol, codes x50 to x99 only in this library. Future versions may add
+/// codes, so handle an unknown code according to its first digit.
 ///
 /// The _MAX enumerator of this and other enums only fixes the size of the type. It is not a value.
 typedef enum stridewire_status {
@@ -61,8 +61,8 @@ typedef enum stridewire_status {
 /// Returns a stable lower-case name such as "no_such_avatar", or "unknown" for an unknown code.
 const char* stridewire_status_name(stridewire_status status);
 
-/// Returns a sentence that describes a code. For an unknown code, it describes the class given by
-/// the hundreds. Never NULL.
+/// Returns a sentence that describes a code. For an unknown code, it describes the class of codes
+/// with the same first digit. Never NULL.
 const char* stridewire_status_text(stridewire_status status);
 
 #ifdef __cplusplus

@@ -15,7 +15,7 @@ export interface CommandActions {
   cancel(): void;
   toggleRandomWalk(): void;
   setAllAvatars(on: boolean): void;
-  /** Sets what clicks on the ground request. Null: they select avatars. */
+  /** Sets the tool for clicks on the ground. Null: clicks select avatars. */
   setTool(tool: ClickTool | null): void;
   addWaypoint(x: number, z: number): void;
   /** Requests a walk. With heading null, the avatar keeps its direction of arrival. */

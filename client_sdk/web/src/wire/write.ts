@@ -14,9 +14,9 @@ const magic = 0x1a505753;  // "SWP", 0x1a
 const frameVersion = 1;
 
 /**
- * Writes a message as a frame. Properties may be absent if the schema states a default. The module
- * sets `seq`, and `world` and `subscription` of commands, so if they are absent, any valid number
- * is written.
+ * Writes a message as a frame. Properties may be absent if the schema states a default. Absent
+ * `seq`, `world` and `subscription` are written as 1, because the WebAssembly module sets them in
+ * commands.
  * @throws Malformed a value has the wrong type, or does not fit into the type of its field. The
  *     WebAssembly module checks everything else.
  */

@@ -238,7 +238,7 @@ class AvatarCrowd {
 /// Range of the speeds at which the avatars of a library walk straight ahead on level ground.
 struct WalkSpeeds {
   double slowest_m_s = 0.0;
-  double fastest_m_s = 0.0;  ///< 0 if the library cannot walk far enough for measuring its speed.
+  double fastest_m_s = 0.0;  ///< 0: unknown, because the library cannot walk far enough.
 
   /// Speeds that differ by this fraction count as equal, because strides vary.
   static constexpr double kTolerance = 0.05;

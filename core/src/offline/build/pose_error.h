@@ -20,12 +20,13 @@ inline constexpr int kBodyPartCount = 4;
 /// Returns "trunk", "head", "arms" or "legs".
 [[nodiscard]] std::string_view BodyPartName(BodyPart part);
 
-/// Returns the part of the body of each joint:
+/// Returns the part of the body to which each joint belongs:
 ///
 /// - Legs: the hips and all joints below them.
-/// - Arms: other joints that belong to one side, according to FindMirrorJoints. Without a mirror,
-///   those more than 3 cm from the root sideways in the stand pose.
-/// - Head: joints in the middle above the joint where the arms branch off.
+/// - Arms: all other joints of the left or right side, according to FindMirrorJoints. If a skeleton
+///   has no mirror joints: all other joints that are more than 3 cm to the side of the root in the
+///   stand pose.
+/// - Head: joints of neither side, above the joint at which the arms branch off.
 /// - Trunk: all other joints.
 [[nodiscard]] std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton,
                                                   ConstPoseSpan stand_pose);

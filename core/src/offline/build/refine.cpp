@@ -20,7 +20,7 @@ namespace {
 constexpr double kMaxResidualM = 5e-6;
 constexpr CorrectionLimits kSolve = {.max_iterations = 40, .tolerance_m = 1e-6};
 // The largest error must decrease by at least this fraction to count as an improvement. Smaller
-// changes are noise of the survey.
+// changes are within the accuracy of SurveyHull.
 constexpr double kMinGain = 1e-3;
 // Factor on the limit of the sum of |w| at the samples, because the sum may be larger between them.
 constexpr double kSampledWeightShare = 0.96;

@@ -5,14 +5,16 @@
 
 namespace stridewire::builtin {
 
-/// Each function adds a group of left steps and one of their mirror images to `library`. The
-/// comments list the parameters of the groups.
-/// Parameters start_z, end_z. Call it before the other functions.
+// Each function adds a group of left steps and a group of their mirror images to `library`. The
+// comments list the parameters of the groups.
+
+/// Parameters: start_z, end_z. Must be called before the other functions.
 void AddStraightSteps(RawLibrary& library);
-void AddBackwardSteps(RawLibrary& library);  ///< start_z, end_z
-void AddTurningSteps(RawLibrary& library);   ///< Parameters start_x, start_z, end_z, turn.
-void AddSideSteps(RawLibrary& library);      ///< Parameters start_x, start_z, end_x, end_z.
-/// Parameters start_y, start_z, end_y, end_z, turn. Adds two groups upwards and two downwards.
+void AddBackwardSteps(RawLibrary& library);  ///< Parameters: start_z, end_z.
+void AddTurningSteps(RawLibrary& library);   ///< Parameters: start_x, start_z, end_z, turn.
+void AddSideSteps(RawLibrary& library);      ///< Parameters: start_x, start_z, end_x, end_z.
+/// Parameters: start_y, start_z, end_y, end_z, turn. Adds two groups of steps upward and two groups
+/// of steps downward.
 void AddClimbingSteps(RawLibrary& library);
 
 }  // namespace stridewire::builtin

@@ -116,7 +116,7 @@ class JumpPath {
   void PlanCentre() {
     const FigurePose standing = StandingPose();
     DVec3 rest = BodyCentre(figure_, standing);
-    // Positions are relative to the balls of the feet.
+    // Measures z from the balls of the feet.
     rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;
 
     // At toe-off the centre is ahead of the balls and as high as the legs allow.
@@ -241,7 +241,8 @@ class JumpPath {
       SolveLeg(Foot::kLeft, PoseOfFoot(Foot::kLeft, time_s, pose), pose);
       SolveLeg(Foot::kRight, PoseOfFoot(Foot::kRight, time_s, pose), pose);
       DVec3 miss = centre_m - BodyCentre(figure_, pose);
-      miss.x = -pose.root_m.x;  // The jump is symmetric, so sideways errors are those of the root.
+      miss.x =
+          -pose.root_m.x;  // The jump is symmetric, so the sideways error equals that of the root.
       pose.root_m += 1.15 * miss;
       if (glm::dot(miss, miss) < 1e-20) break;
     }

@@ -306,7 +306,8 @@ bool StandsOnHands(const FigureShape& figure, const FoundLegs& legs) {
     for (const FoundLeg& leg : legs.legs) sum += pose[Index(leg.hip)] - pose[Index(leg.ankle)];
     return sum;
   };
-  // The trunk ends where the arms begin, at most at the neck.
+  // Returns the vector along the trunk: from the root to the joints at which the arms begin, or to
+  // the neck if the arms branch off above it.
   const auto trunk_of = [&](const Pose& pose) {
     DVec3 trunk(0.0);
     for (const int hand : hands) {

@@ -129,9 +129,10 @@ class StepGenerator {
 
  private:
   struct Leg {
-    DQuat ankle_rotation;       // World rotation of the foot in the step.
-    DVec3 ball_m = DVec3(0.0);  // Ball without detour and lift, relative to the fixed ball.
-    DVec3 hip_m = DVec3(0.0);   // Relative to the root.
+    DQuat ankle_rotation;  // World rotation of the foot in the step.
+    // Position of the ball relative to the fixed ball, before the detour and the lift are added.
+    DVec3 ball_m = DVec3(0.0);
+    DVec3 hip_m = DVec3(0.0);  // Relative to the root.
     DVec3 ankle_to_ball = DVec3(0.0);
     DVec3 ankle_to_tip = DVec3(0.0);
     DVec3 ankle_to_heel = DVec3(0.0);

@@ -98,7 +98,7 @@ struct FootPlan {
   /// If the previously displayed pose had no planted feet, the changes due to planting fade in over
   /// this time: soles are lifted out of the ground, and the root is lowered so that legs can bend.
   double plant_fade_s = 0.0;
-  /// All of the plan except `missed_m` and `missed_rad`. Set when the plan is complete.
+  /// The plan in the layout of the planting kernels. Set when the plan is complete.
   PackedFootPlan packed{};
 
   std::array<FootTrajectory, 2> feet;     ///< [foot]
@@ -108,9 +108,9 @@ struct FootPlan {
   DVec3 root_residual_m = DVec3(0.0);
   DVec3 root_residual_m_s = DVec3(0.0);
   RootApproach root_approach;
-  /// True on terrain: soles are lifted out of the ground that they leave and land on. On level
-  /// ground, soles in the blend are close enough to the ground, and without the lift knees move
-  /// less.
+  /// True on terrain: planting lifts soles out of the ground that they leave and land on. False on
+  /// level ground: the blend already keeps soles close to the ground, and a lift would only move
+  /// the knees.
   bool keeps_above_ground = false;
   /// Root of the displayed pose minus that of the planted pose when the plant fade began.
   Vec3 plant_fade_root_m = Vec3(0.0f);

@@ -257,7 +257,8 @@ class Planner {
     }
     const HeightRange lowest = LevellingRange(lowest_m);
     const HeightRange highest = LevellingRange(std::max(at_landing_m, at_end_m));
-    // If the height of the foot changes a lot while it stands, it may sink a little deeper.
+    // If no height keeps both the lowest and the highest sole in range, the lowest one may sink by
+    // up to another kMaxSinkM.
     if (lowest.min_m > highest.max_m) return std::max(highest.max_m, lowest.min_m - kMaxSinkM);
     return std::clamp(0.0, lowest.min_m, highest.max_m);
   }
@@ -565,11 +566,12 @@ class Planner {
   static constexpr std::size_t kSwing = kEarly + kEarlySamples.size();
   // Indices of two times: the start of the movement, and kBlendStepS later.
   static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();
-  // The end of the movement, without the difference pose.
+  // Index of the end of the movement, sampled without the difference pose.
   static constexpr std::size_t kBlendedEnd = kEntry + 2;
   static_assert(kBlendedEnd < FootSampler::kMaxTimes);
   std::array<double, kBlendedEnd + 1> times_s_;
-  // Times shortly before the moving foot leaves the ground, and before it lands.
+  // First indices in contact_times_s_ of the times before the moving foot leaves the ground, and of
+  // those shortly before it lands.
   static constexpr std::size_t kStandingLate = 0;
   static constexpr std::size_t kLandingSoon = kReleaseSamples.size();
   std::array<double, kReleaseSamples.size() + kLandingSamples.size()> contact_times_s_;

@@ -148,7 +148,8 @@ struct FinishPosesJob {
   const float* fraction;       ///< GridSamples::fraction
   const float* slope_s;        ///< GridSamples::slope_s
   const float* is_eased;       ///< GridSamples::is_eased
-  const float* is_inertial;    ///< [kBlock]: 1 if the lane is inertial, else 0; used if it is eased
+  /// [kBlock]: 1 if the lane is inertial, else 0; ignored for lanes that are not eased
+  const float* is_inertial;
 };
 
 /// Normalizes rotations, adds the remaining difference poses and transforms the poses into world

@@ -5,8 +5,8 @@
 
 namespace stridewire::protocol {
 
-/// Result of a command. The hundreds state who can correct the problem. Future versions may add
-/// codes, so a receiver treats an unknown code by its hundreds.
+/// Result of a command. The first digit states who can correct the problem. Future versions may add
+/// codes, so a receiver must judge an unknown code by its first digit.
 enum class StatusCode : std::uint16_t {
   kOk = 0,
   // Codes 100 to 199: the caller made an invalid request.
