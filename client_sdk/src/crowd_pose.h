@@ -15,7 +15,7 @@ enum CrowdFlags : std::uint8_t {
   /// before it, for example because the avatar was teleported.
   kCrowdDiscontinuity = 1,
   kCrowdStanding = 2,       ///< The avatar stands and its queue is empty.
-  kCrowdHeld = 4,           ///< The pose does not move, because no continuous pose follows.
+  kCrowdHeld = 4,           ///< The motion has stopped, because no later pose continues it.
   kCrowdReduced = 8,        ///< The server sent the pose with PoseDetail::kReduced.
   kCrowdRoot = 16,          ///< The server sent the pose with PoseDetail::kRoot.
   kCrowdExtrapolated = 32,  ///< The pose continues the motion after the newest pose.

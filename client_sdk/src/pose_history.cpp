@@ -32,8 +32,8 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
       correction_.state = Correction::State::kNone;
       if (displayed_s_ < this->stamp(0).time_s) displayed_s_ = kNever;
     } else if (displayed_s_ > newest.time_s && correction_.state != Correction::State::kPending) {
-      // The motion after the newest pose was extrapolated and displayed, and the new pose changes
-      // it. Stores the displayed pose, from which the motion then continues.
+      // An extrapolated pose was displayed after the newest pose, and the new pose may differ from
+      // it. Stores the displayed pose, so that the motion continues from there.
       Vec3 root_m;
       if (Sample(displayed_s_, root_m, displayed_)) {
         correction_.state = Correction::State::kPending;
@@ -156,7 +156,7 @@ void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
 bool PoseHistory::IsInterrupted() const {
   if (size_ == 0 || displayed_s_ == kNever) return false;
   const double newest_s = stamp(size_ - 1).time_s;
-  // Poses of distant avatars may be further apart than the longest extrapolation.
+  // The server may send poses of distant avatars at intervals longer than kMaxExtrapolationS.
   const double interval_s = size_ > 1 ? newest_s - stamp(size_ - 2).time_s : 0.0;
   return displayed_s_ < stamp(0).time_s ||
          displayed_s_ - newest_s > std::max(kMaxExtrapolationS, 2.0 * interval_s);
@@ -228,7 +228,8 @@ std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3
   const std::size_t j = after;
 
   const bool exact = stamp(i).time_s == time_s;
-  // After an interruption of the connection, the motion that was displayed before continues.
+  // If a gap precedes the discontinuity, the connection was interrupted. The motion before the gap
+  // is then extrapolated instead of ending at once.
   const double before_s = i > 0 ? stamp(i).time_s - stamp(i - 1).time_s : 0.0;
   const bool is_last =
       j == size_ || (stamp(j).discontinuity && stamp(j).time_s - stamp(i).time_s > 1.5 * before_s);

@@ -14,8 +14,9 @@
 
 namespace stridewire::client {
 
-/// Four poses for cubic interpolation in an interval: before it, at its start, at its end, and
-/// after it. If there is no pose before or after the interval, use the start or the end instead.
+/// Four poses for cubic interpolation in an interval: the pose before it, its start, its end, and
+/// the pose after it. If there is no pose before or after the interval, `before` must be the start,
+/// or `beyond` the end.
 struct PoseKeys {
   std::array<double, 4> times_s;
   ConstPoseSpan before;
@@ -36,7 +37,7 @@ void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
 /// Jitter buffer: the last poses of one avatar, oldest first. Allocates only in its constructor. A
 /// full buffer drops its oldest pose.
 ///
-/// The displayed motion is continuous, whenever poses arrive:
+/// The displayed motion is continuous, no matter when poses arrive:
 /// - A curve through the poses is not changed after its display has begun. The slope at a pose is
 ///   the secant through both neighbours. If an interval is displayed before the pose after it has
 ///   arrived, the slope at its end remains that of the interval itself.
@@ -52,7 +53,7 @@ class PoseHistory {
   /// `capacity` (in poses) and `joint_count` must be above 0.
   PoseHistory(std::size_t capacity, std::size_t joint_count);
 
-  /// Returns the memory that a history takes, in bytes.
+  /// Returns the memory of a history in bytes.
   [[nodiscard]] static std::size_t Bytes(std::size_t capacity, std::size_t joint_count);
 
   /// Adds a pose. Returns false and does nothing unless its tick and its time exceed those of the

@@ -199,7 +199,8 @@ void PoseRecording::Interpolate(const Neighbours& around, double time_s, CrowdPo
   const std::size_t joints = out.joint_count;
   if (start.joint_count != joints) return;
   const auto time_of = [](const Decoded* tick) { return tick->source->info.server_time_s; };
-  // Returns true if the pose of the avatar in `tick` continues the pose before it.
+  // Finds the pose of the avatar in `tick`. Returns true if there is one and it continues the
+  // previous pose of the avatar.
   const auto find = [](const Decoded* tick, protocol::AvatarId avatar, std::size_t& index) {
     return tick != nullptr && tick->Find(avatar, index) &&
            (tick->poses.flags[index] & kCrowdDiscontinuity) == 0;
@@ -253,8 +254,8 @@ void PoseRecording::SampleAll(double time_s, const std::function<bool(protocol::
   const auto repeated = std::ranges::unique(out.avatars);
   out.avatars.erase(repeated.begin(), repeated.end());
   out.Resize(out.avatars.size(), out.joint_count);
-  // An avatar that crossed a ring of a region is in the ticks of two details. The later one is
-  // used, because it is written last.
+  // If an avatar has moved to another ring of a region, two streams contain it. The pose of the
+  // later tick is used, because it is written last.
   std::ranges::sort(around_, {}, [](const Neighbours& n) { return n.start->source->info.tick; });
   for (const Neighbours& around : around_) Interpolate(around, time_s, out);
   if (DecodedBytes() > max_bytes_ / 2) {

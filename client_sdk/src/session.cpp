@@ -210,7 +210,7 @@ void Session::ScheduleAttempt(bool was_ready, bool server_leaves, double now_s) 
   }
   address_ = (address_ + 1) % count;
   failed_attempts_ = was_ready ? 0 : failed_attempts_ + 1;
-  // After a shutdown, the delay distributes the clients that move to the next server over time.
+  // After a shutdown, the delays spread the reconnects of all clients over time.
   const bool waits = was_ready || failed_attempts_ >= count;
   next_attempt_s_ = waits ? now_s + backoff_.Next() : now_s;
   if (waits) failed_attempts_ = 0;
@@ -231,7 +231,7 @@ void Session::CloseWithError(stridewire_status status, std::string_view text) {
 }
 
 void Session::Reset() {
-  ++connection_number_;  // After this, an open socket does not belong to the session any more.
+  ++connection_number_;  // A socket that is still open no longer belongs to the session.
   unanswered_.clear();
   worlds_.clear();
   command_count_ = 0;

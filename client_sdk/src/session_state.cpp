@@ -113,8 +113,8 @@ std::uint64_t SessionState::EveryNTicks(const World& world, protocol::PoseMode m
 }
 
 double SessionState::PoseIntervalS() const {
-  // If the poses of an avatar are further apart than this, the avatar is extrapolated instead of
-  // delaying all others.
+  // Longer intervals between the poses of an avatar do not increase the delay of all avatars. Such
+  // an avatar is extrapolated instead.
   constexpr double kMaxIntervalS = 0.25;
   std::uint64_t every = 1;
   for (const auto& [handle, world] : worlds_) {

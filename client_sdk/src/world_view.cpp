@@ -23,7 +23,7 @@ std::shared_ptr<const protocol::CompactCodecs> WorldView::MakeCodecs(
   if (info.rotation_quantizations.empty()) return nullptr;
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
-  // The decoder has checked the codes and parents, so this does not fail.
+  // Make does not fail, because the decoder has checked the quantizations and parents.
   auto codecs =
       protocol::CompactCodecs::Make(info.rotation_quantizations, parents, info.reduced_joints);
   if (!codecs) return nullptr;
@@ -136,7 +136,8 @@ const WorldView::Track* WorldView::FindTrack(protocol::AvatarId avatar) const {
 }
 
 WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
-  // The avatars of a message are in ascending order, with those of other shards in between.
+  // A message contains the avatars of one shard in ascending order. Tracks of other shards lie
+  // between theirs.
   constexpr std::size_t kMaxSteps = 8;
   std::size_t index = next_track_;
   const std::size_t end = std::min(index + kMaxSteps, tracks_.size());

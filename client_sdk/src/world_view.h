@@ -29,7 +29,8 @@ struct PoseBudget {
 struct DisplayCounts {
   std::uint64_t poses = 0;
   std::uint64_t extrapolated = 0;
-  /// Poses after the newest pose of their avatar whose motion had stopped.
+  /// Poses that were displayed for times after the newest received pose, when the extrapolated
+  /// motion had already stopped.
   std::uint64_t held = 0;
 
   void Add(const PoseHistory::Sampled& sampled, bool is_after_newest) {
@@ -169,8 +170,8 @@ class WorldView : public PoseSink {
   /// Returns the first track whose avatar is not below `avatar`.
   [[nodiscard]] std::vector<Track>::iterator LowerBound(protocol::AvatarId avatar);
   [[nodiscard]] const Track* FindTrack(protocol::AvatarId avatar) const;
-  /// Finds or creates the track of an avatar. Returns null if there is no memory for it. Fast if
-  /// the avatar is one of the next after that of the last call.
+  /// Finds or creates the track of an avatar. Returns null if there is no memory for it. Calls with
+  /// ascending ids are fast, because each search begins after the last track that was found.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
 
@@ -196,7 +197,7 @@ class WorldView : public PoseSink {
   std::vector<std::string> layers_;
   std::shared_ptr<const protocol::CompactCodecs> codecs_;  ///< Codecs of compact poses, or null.
   std::optional<std::set<protocol::AvatarId>> filter_;
-  std::vector<Track> tracks_;  // In ascending order of the avatars.
+  std::vector<Track> tracks_;  // In ascending order of avatar ids.
   // Index after the last track that was found, where the next search starts.
   std::size_t next_track_ = 0;
   std::size_t gone_count_ = 0;  // Number of tracks that are gone.

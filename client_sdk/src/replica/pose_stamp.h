@@ -11,7 +11,7 @@ struct PoseStamp {
   std::uint64_t tick = 0;
   double time_s = 0.0;         ///< Server time in seconds.
   bool discontinuity = false;  ///< The client must not interpolate from the previous pose.
-  /// Number of the continuous motion. Consecutive poses with equal numbers may be interpolated.
+  /// Consecutive poses with equal segments belong to one continuous motion and may be interpolated.
   std::uint32_t segment = 0;
   bool standing = false;  ///< The avatar stands and its queue is empty.
   protocol::PoseDetail detail = protocol::PoseDetail::kAll;

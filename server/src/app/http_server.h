@@ -46,7 +46,7 @@ class HttpServer {
  public:
   using Page = std::function<HttpAnswer(const HttpQuery&)>;
   /// Receives a connection that requests a WebSocket upgrade, and the address of the client. The
-  /// transport answers the upgrade. The connection does not count against max_connections any more.
+  /// transport answers the upgrade. The connection no longer counts against max_connections.
   using OnStream = std::function<void(std::unique_ptr<Transport>, const boost::asio::ip::address&)>;
 
   HttpServer(int max_connections, ThreadMetrics& metrics);

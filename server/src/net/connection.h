@@ -76,7 +76,7 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   /// Drops waiting poses, sends all other waiting frames and the end of the stream, and closes the
   /// connection when the peer has closed it, at the latest after kLinger. Waiting ensures that the
   /// last message arrives, because closing a socket with unread bytes would discard it. The handler
-  /// is not called any more. A WebSocket sends `code`, unless a bad frame has set another code.
+  /// receives no further calls. A WebSocket sends `code`, unless a bad frame has set another code.
   void CloseGently(CloseCode code = CloseCode::kNormal);
   /// Closes at once.
   void Close();

@@ -110,7 +110,7 @@ class Transport {
   virtual void Close() = 0;
 
   // Detach and Attach move the transport to the io_context of another thread. No operation may be
-  // pending. Attach returns false if the socket cannot be used any more.
+  // pending. Attach returns false if the socket is no longer usable.
   virtual void Detach() = 0;
   [[nodiscard]] virtual bool Attach(boost::asio::io_context& context) = 0;
 };

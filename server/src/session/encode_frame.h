@@ -11,8 +11,8 @@
 
 namespace stridewire::server {
 
-/// Encodes a message that the server has created. Encoding fails only because of an error in the
-/// server; then the function logs the error and returns null.
+/// Encodes a message that the server has created. Encoding fails only if the server has a bug. In
+/// this case, the function logs the error and returns null.
 template <typename Message>
 [[nodiscard]] SharedFrame EncodeFrame(protocol::Encoder& encoder, const Message& message) {
   auto frame = std::make_shared<std::vector<std::byte>>();

@@ -12,8 +12,8 @@
 
 namespace stridewire::server {
 
-/// Combines what the sessions of one shard need from each world, and sends it to all shards when it
-/// changes.
+/// Combines the data needs of all sessions of one shard into an Interest per world. Sends an
+/// Interest to all shards when it changes.
 class InterestTracker {
  public:
   using Sessions = std::map<SessionId, std::unique_ptr<Session>>;
@@ -22,8 +22,8 @@ class InterestTracker {
   /// Borrows `sessions`. `broadcast` must deliver an Interest to all shards.
   InterestTracker(int shard, const Sessions& sessions, Broadcast broadcast);
 
-  /// Must be called when a session needs more or less of `world`. Sends the combined interest at
-  /// once if it has changed, except for selected avatars and regions.
+  /// Must be called when a session needs more or less data of `world` than before. If the combined
+  /// interest has changed, sends it at once. Changes of selected avatars and regions are delayed.
   void Update(const std::shared_ptr<World>& world);
 
   /// Must be called when a session has changed only its selected avatars or its region. They are

@@ -60,7 +60,7 @@ protocol::Movements MovementFeed::Select(const protocol::Movements& step, std::s
     result.records.insert(result.records.end(), record.begin(), record.end());
     result.ends.push_back(static_cast<std::uint32_t>(result.records.size()));
   };
-  // The complete step fits into a frame. The avatars that are gone may use the rest.
+  // A complete step fits into a frame. Ids of avatars that are gone may take the remaining bytes.
   constexpr std::size_t kAvatarBytes = 9;
   constexpr std::size_t kOverheadBytes = 512;
   STRIDEWIRE_CHECK(step.avatars.size() <= protocol::kMaxItems);

@@ -34,8 +34,8 @@ class MovementFeed {
 
   /// True if the client receives every step unchanged.
   [[nodiscard]] bool covers_all() const { return covers_all_; }
-  /// Returns the part of `step` that concerns the selected avatars. Also reports avatars that are
-  /// not selected any more as gone, up to `max_bytes`. The rest are reported with the next step.
+  /// Returns the part of `step` that concerns the selected avatars. Also reports deselected avatars
+  /// as gone until the message has `max_bytes`. The others are reported with the next step.
   [[nodiscard]] protocol::Movements Select(const protocol::Movements& step, std::size_t max_bytes);
 
   /// Movements were dropped, so the client has no valid avatars.

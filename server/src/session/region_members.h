@@ -23,9 +23,9 @@ namespace stridewire::server {
 ///   rows   |------- 3 -- 9 -----|---- 1 -------- 4 --|----- 7 -------|--------|
 ///   due    [3, 9]                [1, 4]               [7]
 ///
-/// An avatar enters with the first delivery that contains its pose, and leaves with the first
-/// delivery of any mode. Thus each change is reported once, and moving from ring to ring is not
-/// reported.
+/// An avatar enters the region with the first delivery that contains its pose, and leaves it with
+/// the first delivery of any mode. Each change is thus reported once. A move from one ring to
+/// another is not reported.
 class RegionMembers {
  public:
   /// Sets the region. Beyond its rings, poses are due every `every_n_ticks` ticks in `mode`.

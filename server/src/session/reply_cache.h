@@ -24,8 +24,8 @@ class ReplyCache {
     kNew,        ///< The next command; the session executes it.
     kPending,    ///< The command was accepted, but not answered yet; the session ignores it.
     kAnswered,   ///< The command was answered; the session sends the stored reply again.
-    kForgotten,  ///< The command was executed, but its reply is not stored any more.
-    kGap,        ///< A command with a smaller number is missing.
+    kForgotten,  ///< The command was executed, but its reply is no longer stored.
+    kGap,        ///< A command before this one was not received.
   };
   struct Answer {
     SharedFrame reply;   ///< The encoded Reply; null while the command is pending.

@@ -25,7 +25,7 @@ constexpr const char* kNotJoinedText = "this session has not joined that world";
 // index in the command.
 template <typename Item, typename Part>
 void Distribute(std::vector<Item>&& items, std::vector<Part>& parts) {
-  // Consecutive ids are distributed evenly.
+  // Consecutive ids are distributed evenly over the shards.
   for (Part& part : parts) part.items.reserve(items.size() / parts.size() + 1);
   const int shard_count = static_cast<int>(parts.size());
   std::uint32_t index = 0;
@@ -351,7 +351,7 @@ void SessionCommands::Execute(protocol::Spawn&& command) {
 void SessionCommands::Execute(protocol::Request&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
-  // Counts the avatars. All requests of an avatar are usually in a row.
+  // Counts the avatars, assuming that the requests of an avatar follow each other.
   std::size_t avatars = 0;
   for (std::size_t i = 0; i < command.items.size(); ++i) {
     avatars += i == 0 || command.items[i].avatar != command.items[i - 1].avatar;

@@ -23,7 +23,7 @@ namespace stridewire::server {
 ///   Handle ---> pending, until shards or the main thread have replied ---> answered --> forgotten
 ///          \--- refused, or needs no other thread -----------------------^
 ///
-/// The Reply of a forgotten command is not stored any more (ReplyCache).
+/// The Reply of a forgotten command is no longer stored (ReplyCache).
 class SessionCommands {
  public:
   SessionCommands(SessionContext& context, SessionStream& stream);

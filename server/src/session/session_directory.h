@@ -32,7 +32,7 @@ class SessionDirectory {
   /// Removes a session that has ended. Unknown ids are ignored.
   void Close(SessionId id);
 
-  /// Adds a session that exists although it was closed. Known ids are ignored.
+  /// Adds a session that replaces one that has ended (SessionRestored). Known ids are ignored.
   void Restore(int shard, const SessionIdentity& identity);
 
   [[nodiscard]] int CountOf(const std::string& address) const;

@@ -38,7 +38,7 @@ class SessionHost {
   virtual void SendToServer(ServerMessage message) = 0;
   /// Destroys an ended session after the current call has returned.
   virtual void DestroySession(SessionId session) = 0;
-  /// Called when the session needs more or less of this world than before.
+  /// Called when the session needs more or less data of this world than before.
   virtual void InterestChanged(const std::shared_ptr<World>& world) = 0;
   /// Called when the session has moved its region, but otherwise needs the same as before.
   virtual void SelectionChanged(WorldId world) = 0;

@@ -112,7 +112,7 @@ void SessionStream::OnMovements(SharedMovements& movements) {
       SendRegionChange(delivery.world, delivery.tick, change);
     }
   }
-  // If the queue is empty, OnSent is not called any more, so a lost feed is restarted here.
+  // OnSent, which usually restarts lost feeds, is not called while the send queue is empty.
   RequestStates();
 }
 

@@ -208,8 +208,8 @@ std::uint64_t SessionStream::SendEvents(protocol::Events&& message) {
   const SharedFrame frame = EncodeFrame(context_.host.encoder(), message);
   if (frame == nullptr) return 0;
   const bool was_sent = context_.connection != nullptr && context_.connection->SendEvents(frame);
-  // If the send queue is full, the message is dropped, because it would be out of order if it were
-  // sent later.
+  // If the send queue is full, the message is dropped. If it were sent later, it would be out of
+  // order.
   if (context_.connection != nullptr && !was_sent) return message.events.size();
   event_replay_.Add({message.number, message.events.size(), was_sent, frame});
   const std::uint64_t dropped = event_replay_.TakeDropped();
@@ -220,7 +220,8 @@ std::uint64_t SessionStream::SendEvents(protocol::Events&& message) {
 void SessionStream::CountDroppedEvents(WorldId world, std::uint64_t events) {
   if (events == 0) return;
   if (context_.connection != nullptr) context_.host.metrics().Reached(Limit::kControlBuffer);
-  // Dropped stored events may belong to another world of this session. Only the sum matters.
+  // Dropped events that were stored may belong to another world of the session. Only the total over
+  // all worlds matters.
   context_.worlds.at(world).dropped_events += events;
   context_.host.metrics().events_dropped.Add(events);
 }

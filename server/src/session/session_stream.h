@@ -25,7 +25,7 @@ class SharedMovements {
   [[nodiscard]] const MovementDelivery& delivery() const { return delivery_; }
   /// Returns one frame per step, with all avatars.
   [[nodiscard]] const std::vector<SharedFrame>& frames();
-  /// Returns the frame of step `i` without avatars. `empty` is this message.
+  /// Returns the frame of `empty`, which is the message of step `i` without avatars.
   [[nodiscard]] const SharedFrame& EmptyFrame(std::size_t i, const protocol::Movements& empty);
 
  private:
@@ -96,8 +96,8 @@ class SessionStream {
   void Resume(std::uint64_t last_events_number);
   /// Stops everything that concerns a world and drops its waiting frames.
   void LeaveWorld(WorldId world);
-  /// Removes a subscription and drops waiting frames that are not needed any more. Returns nullopt
-  /// if `id` does not exist.
+  /// Removes a subscription and drops waiting frames that are no longer needed. Returns nullopt if
+  /// `id` does not exist.
   std::optional<WorldId> RemoveSubscription(protocol::SubscriptionId id);
 
   /// Applies changed subscriptions to the movement feeds of a world.

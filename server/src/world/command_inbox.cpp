@@ -35,7 +35,7 @@ std::size_t CommandInbox::Run(const Execute& execute, const OnResult& on_result)
   std::vector<WorldCommand> waiting;
   std::set<SessionId> waiting_sessions;
   for (WorldCommand& command : commands_) {
-    // A terrain has its own tick and must not be delayed.
+    // A terrain must not be delayed, because all shards apply it at the same tick.
     if (waiting_sessions.contains(command.session) &&
         !std::holds_alternative<TerrainPart>(command.part)) {
       waiting.push_back(std::move(command));

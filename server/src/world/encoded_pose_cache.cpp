@@ -98,7 +98,8 @@ void EncodedPoseCache::Allocate(Slot& slot) {
   STRIDEWIRE_CHECK(slot.cache_ == nullptr || slot.cache_ == this);
   if (slot.cache_ != nullptr) return;
   if (free_.empty()) {
-    // Planes are large, so they grow to the number of avatars or by an eighth, not by doubling.
+    // Planes are large. To save memory, they grow to the number of avatars or by an eighth,
+    // whichever is more, instead of doubling.
     const std::size_t first = slots_.size();
     const std::size_t count = std::max({std::size_t{64}, avatar_count_, first + first / 8});
     STRIDEWIRE_CHECK(count > first && count < kNoSlot);
@@ -292,8 +293,8 @@ EncodedPoseCache::Encoded EncodedPoseCache::FindOverflow(std::uint32_t slot, std
   if ((flags >> mode & 1u) == 0) {
     return {{BytesOf(slot, pose) + modes_[mode].offset, modes_[mode].codec->pose_bytes()}};
   }
-  // Skips the uncompressed poses that were stored before this one: those of earlier poses, then
-  // those of earlier modes.
+  // Skips the uncompressed poses that are stored before this one: those of the same pose in earlier
+  // modes, and those of earlier poses.
   constexpr unsigned kUncompressed = (1u << kMaxModes) - 1;
   auto before = static_cast<std::size_t>(std::popcount(flags & kUncompressed & ((1u << mode) - 1)));
   for (std::size_t p = 0; p < pose; ++p) {
@@ -315,7 +316,7 @@ Vec3 EncodedPoseCache::FindRoot(const Slot& slot) const {
     std::memcpy(&root_m, bytes, kRootBytes);
     return root_m;
   }
-  // In every mode a pose begins with its root, even if only the uncompressed format can represent
+  // The bytes of every mode begin with the root, even if only the uncompressed format can represent
   // the rotations.
   const bool is_encoded =
       !state.has_overflow || (overflow_.at(slot.index_).flags[pose] >> kMaxModes) == 0;

@@ -54,7 +54,7 @@ struct PoseScratch {
 ///
 /// Release (the avatar was removed) and Forget (SetModes, or the crowd became large) lead from
 /// empty, timed and constant to empty. Neither may happen while a slot is scheduled. An avatar with
-/// animation layers stores a pose in every step, also directly after empty.
+/// animation layers stores a pose in every step, in state empty as well.
 ///
 ///   empty       The slot contains no pose.
 ///   scheduled   FinishStep will evaluate the poses of a movement. Until then, the movement must

@@ -187,7 +187,7 @@ struct PoseDelivery {
   protocol::PoseMode mode = protocol::PoseMode::kFull;
   int from_shard = 0;
   std::uint64_t tick = 0;
-  std::uint32_t avatar_count = 0;  ///< In `parts`.
+  std::uint32_t avatar_count = 0;  ///< Number of avatars in `parts`.
   /// Batch of all avatars; empty if no session observes all avatars.
   std::vector<SharedFrame> parts;
   /// The encoded poses from which sessions compose smaller batches. Contains at least the poses of
@@ -267,7 +267,8 @@ struct SessionIdentity {
 struct SessionEnded {
   SessionId session = 0;
 };
-/// A session exists again that had ended while its client was reconnecting.
+/// Reports a new session with the identity of a session that ended while its client was
+/// reconnecting.
 struct SessionRestored {
   int shard = 0;
   SessionIdentity identity;

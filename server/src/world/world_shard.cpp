@@ -161,7 +161,7 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
   auto it = avatars_.end();
   for (const RequestPart::Item& item : part.items) {
     const protocol::RequestItem& asked = item.request;
-    // Items of a crowd are usually in the order of ids, with all items of an avatar in a row.
+    // The items of a large command are usually sorted by avatar id.
     if (it != avatars_.end() && it->first != asked.avatar) ++it;
     if (it == avatars_.end() || it->first != asked.avatar) it = avatars_.find(asked.avatar);
     if (it == avatars_.end()) {
@@ -376,8 +376,8 @@ void WorldShard::SetInterest(const Interest& interest) {
   are_selected_rows_valid_ = false;
   cache_.SetModes(interest_.CompactModes(), interest_.CommonInterval());
   for (std::size_t mode = 0; mode < kSentModes.size(); ++mode) {
-    // A session may select avatars that do not exist (any more). It recognizes this by one delivery
-    // without poses.
+    // If a session selects avatars that do not exist, it needs one delivery without poses to
+    // recognize this.
     last_had_poses_[mode] = interest_.IsObserved(kSentModes[mode]) &&
                             (last_had_poses_[mode] || interest.poses[mode].interval.subset > 0);
   }

@@ -77,8 +77,8 @@ class WorldShard {
   /// is nothing to deliver.
   [[nodiscard]] bool TakeMovements(std::uint64_t tick, MovementDelivery& delivery);
 
-  /// Encodes the states of avatars after the last tick: at least one, and then until
-  /// `request.enough_bytes` is exceeded.
+  /// Encodes the states of avatars after the last tick. Stops after the state with which the size
+  /// exceeds `request.enough_bytes`, so the result contains at least one state.
   [[nodiscard]] StatesResult States(const StatesRequest& request, protocol::Encoder& encoder) const;
 
   /// Describes an avatar after `tick`, for InspectAvatar. Parameters of examples are omitted if
@@ -167,7 +167,7 @@ class WorldShard {
     DroppedRequest request;
   };
   std::deque<Dropped> dropped_;          // Dropped requests that are not reported yet.
-  std::size_t dropped_events_left_ = 0;  // Number of them that may be reported in this tick.
+  std::size_t dropped_events_left_ = 0;  // How many of them may still be reported in this tick.
   std::uint64_t step_ = 0;               // Number of steps since this object was created.
   std::uint64_t tick_ = 0;               // Tick of the current or last Advance.
   // Number of steps that are left in the current Advance.

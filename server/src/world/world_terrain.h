@@ -27,7 +27,7 @@ struct WorldTerrain {
 /// client joins, never in a tick.
 class TerrainSlot {
  public:
-  /// Returns null if the terrain was never set and is flat.
+  /// Returns null if no terrain was ever set. The ground is then flat.
   [[nodiscard]] std::shared_ptr<const WorldTerrain> Get() const {
     const std::scoped_lock lock(mutex_);
     return terrain_;
