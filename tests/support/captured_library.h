@@ -13,7 +13,7 @@
 
 namespace stridewire {
 
-/// Stands for the two takes of subject 01 in Debian's package assimp-testmodels.
+/// Name for the two takes of subject 01 in Debian's package assimp-testmodels.
 inline constexpr const char* kDebianTakes = "assimp-testmodels";
 
 /// Returns the takes of one subject of the CMU captures ("03", "16"), of a folder below MocapDir()
@@ -76,8 +76,8 @@ inline std::shared_ptr<const MotionLibrary> LibraryOf(const std::vector<std::str
   return library;
 }
 
-/// Same, with every movement as captured, without selection, averaging or smoothing. A reference
-/// for synthesized movements.
+/// Same as LibraryOf, but without selection, averaging and smoothing, so that every movement is as
+/// captured. A reference for synthesized movements.
 inline std::shared_ptr<const MotionLibrary> LibraryOfAll(const std::vector<std::string>& subjects) {
   if (subjects.empty()) return OpenLibrary("builtin").value();
   return BuildFromTakes(TakesOf(subjects), LibraryBuilder{});

@@ -10,10 +10,10 @@
 namespace stridewire {
 
 /// Returns a library with one group of left steps with `parameter_count` parameters (1 to 7), in
-/// the order end_z, start_z, turn, end_x, start_x, end_y, start_y. Examples at random parameters
-/// (`seed`) reproduce them exactly. Between examples, blending the rotations of bent legs makes
-/// a(p) differ from p, the more the larger `reach_m`: the largest forward distance of the feet, up
-/// to 0.7. Aborts on failure.
+/// the order end_z, start_z, turn, end_x, start_x, end_y, start_y. The examples have random
+/// parameters, which depend on `seed`, and meet them exactly. Between examples, blending the
+/// rotations of bent legs makes a(p) differ from p. The difference grows with `reach_m`, the
+/// largest forward distance of the feet, which is at most 0.7. Aborts on failure.
 [[nodiscard]] std::shared_ptr<const MotionLibrary> MakeDistortedLibrary(int parameter_count,
                                                                         int example_count,
                                                                         double reach_m,

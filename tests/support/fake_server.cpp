@@ -91,7 +91,7 @@ FakeServer::FakeServer(std::uint16_t port) {
   socklen_t length = sizeof address;
   if (bind(fd_, reinterpret_cast<const sockaddr*>(&address), length) != 0 || listen(fd_, 16) != 0 ||
       getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &length) != 0) {
-    return;  // port() stays 0, which tests notice
+    return;  // port() then returns 0, and the test cannot connect.
   }
   port_ = ntohs(address.sin_port);
 }

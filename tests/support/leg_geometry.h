@@ -10,9 +10,9 @@
 
 namespace stridewire {
 
-/// Measures both legs of a pose: which way the knees bend, how close the legs are to each other,
-/// and where the soles are. Works for any skeleton. A sole is what touches the ground in the stand
-/// pose.
+/// Measures both legs of a pose: in which direction the knees bend, how close the legs are to each
+/// other, and where the soles are. Works for any skeleton. The soles are defined by the stand pose,
+/// in which they are on the ground.
 class LegGeometry {
  public:
   LegGeometry(const Skeleton& skeleton, ConstPoseSpan stand)
@@ -49,7 +49,7 @@ class LegGeometry {
                 rotations_[Index(leg.ankle)] * heel_offsets_[static_cast<std::size_t>(foot)],
             At(leg.ball, leg.ball_offset_m), At(leg.ball, leg.toe_tip_offset_m)};
   }
-  /// Heights of these three points in the stand pose.
+  /// Heights of heel, ball and tip of the toes in the stand pose.
   [[nodiscard]] const std::array<double, 3>& RestingHeights(Foot foot) const {
     return resting_[static_cast<std::size_t>(foot)];
   }

@@ -12,13 +12,15 @@
 
 namespace stridewire {
 
-/// Measurements of planted feet in a motion, given only the motion and the reported footprints.
+/// Measurements of planted feet, computed only from a motion and its reported footprints.
 struct PlantFigures {
   int contacts = 0;
-  double largest_drift_m = 0.0;    ///< Of a planted ball from its footprint, horizontally.
-  double largest_speed_m_s = 0.0;  ///< Of a planted ball, over any tenth of a second.
+  double largest_drift_m =
+      0.0;  ///< Largest horizontal distance of a planted ball to its footprint.
+  /// Largest mean speed of a planted ball over a tenth of a second.
+  double largest_speed_m_s = 0.0;
   double least_knee_deg = 180.0;
-  /// Magnitudes in deg/s^2, for both knees in every frame.
+  /// Absolute angular acceleration of both knees in every frame, in deg/s^2.
   std::vector<double> knee_acceleration;
   VelocityStep largest_join_step;
   VelocityStep largest_inside_step;
@@ -27,7 +29,7 @@ struct PlantFigures {
 /// Ball positions and foot headings in every frame.
 struct FootCurves {
   std::vector<DVec3> balls[2];
-  /// Minus the toe-out of frame 0, which stands at heading 0.
+  /// Headings relative to that in frame 0, in which the avatar stands at heading 0.
   std::vector<double> headings_rad[2];
 };
 
@@ -106,7 +108,7 @@ inline PlantFigures MeasurePlanting(const Skeleton& skeleton, const Clip& clip,
   VelocitySteps steps(skeleton, clip.fps);
   for (int f = 0; f < frames; ++f) {
     const VelocityStep step = steps.Add(clip.frame(f));
-    // The frames around the transition at frame f - 1.
+    // True for the two frames around a transition between movements.
     const bool at_join =
         is_join[static_cast<std::size_t>(f)] || (f > 0 && is_join[static_cast<std::size_t>(f - 1)]);
     VelocityStep& largest = at_join ? figures.largest_join_step : figures.largest_inside_step;

@@ -68,8 +68,8 @@ inline void DrawLayer(Random& random, AvatarSimulation& avatar) {
                          .speed = random.Draw(0.2, 3.0)});
 }
 
-/// Avatars that receive random requests all the time. Every second one is on uneven ground, and
-/// they play layers. Everything they do depends on `seed` only.
+/// Avatars that continuously receive random requests and play random layers. Every second avatar is
+/// on uneven ground. All requests and poses depend only on `seed`.
 class DrawnCrowd {
  public:
   DrawnCrowd(const std::shared_ptr<const MotionLibrary>& library, int size, unsigned seed,
@@ -95,7 +95,7 @@ class DrawnCrowd {
     }
   }
 
-  /// The same without poses (AvatarSimulation::AdvanceStates).
+  /// Same as Advance, without poses (AvatarSimulation::AdvanceStates).
   void AdvanceStates() {
     DrawRequests();
     std::vector<AvatarSimulation*> all;

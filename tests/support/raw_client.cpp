@@ -74,7 +74,7 @@ void RawClient::SendBytes(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) {  // the server has closed; received data can still be read
+    if (sent <= 0) {  // The server has closed. Data that has arrived can still be read.
       return;
     }
     bytes = bytes.subspan(static_cast<std::size_t>(sent));

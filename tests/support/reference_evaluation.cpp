@@ -197,8 +197,8 @@ double DepthBelow(const Footprint& footprint, const Vec3& normal, const LegRig::
   return near * SmoothMax(0.0, depth_m, kSoftGroundM);
 }
 
-// Height by which to raise a foot so that its sole stays above the ground that it leaves and the
-// ground that it lands on.
+// Returns the height by which to raise a foot so that its sole stays above the ground at the old
+// and the new footprint.
 double LiftOutOfGround(const FootTrajectory& trajectory, double time_s, const LegRig::Side& side,
                        const LegPose& leg, const DVec3& ball, const Quat& turn) {
   const double second =
@@ -221,13 +221,14 @@ double LowerFor(const LegRig::Side& side, double blended_m, const DVec3& reach) 
                                     kLongestExtension * length_m);
   const double free_m =
       std::min(std::max(blended_m, kFreeExtension * length_m), longest_m - kLeastRoom * length_m);
-  // The leg has its full length up to `free_m` and approaches `longest_m` beyond.
+  // Up to `free_m`, the leg is as long as the distance. Beyond it, its length approaches
+  // `longest_m`.
   const double distance_m = glm::length(reach);
   const double excess_m = std::max(distance_m - free_m, 0.0);
   const double allowed_m =
       distance_m - excess_m + excess_m / std::hypot(1.0, excess_m / (longest_m - free_m));
-  // Lowering the root cannot reach a foot that is too far away horizontally. Limit how far it goes
-  // down for such a foot.
+  // Lowering the root does not help to reach a foot that is too far away horizontally. For such a
+  // foot, limits how far the root is lowered.
   const double deepest_m = 0.5 * length_m;
   const double flat_squared = reach.x * reach.x + reach.z * reach.z;
   const double drop_m =
@@ -239,8 +240,8 @@ double LowerFor(const LegRig::Side& side, double blended_m, const DVec3& reach) 
 
 namespace {
 
-// Turns a foot about its ball, heel up, if its ankle would be flexed too far. `knee_m` is where the
-// knee would be. Everything is relative to the root. Returns the turn.
+// If the ankle would be flexed too far, returns a rotation of the foot about its ball that raises
+// the heel. `knee_m` is the position that the knee would have. Positions are relative to the root.
 Quat HeelRise(const LegRig::Side& bones, const Vec3& knee_m, const Vec3& ankle_m,
               const Vec3& ball_m, double share) {
   if (bones.foot_m < kSmallestBoneM) return kIdentityQuat;
@@ -273,8 +274,8 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
   const double settled = plan.plant_fade_s > 0.0
                              ? 1.0 - EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s)
                              : 1.0;
-  // The root moves with the corrections of the feet, and with what lifts them out of the ground.
-  // The shares of the feet in the latter change gradually.
+  // The root moves with the corrections of the feet, and with the lifts that keep them above the
+  // ground. The weight of each foot's lift changes gradually.
   const double entering = EaseOut((time_s - movement.start_offset_s) / movement.ease_out_s);
   DVec3 shift = CorrectFeet(skeleton, rig, movement, time_s, pose).root_m;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

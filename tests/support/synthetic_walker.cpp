@@ -211,7 +211,8 @@ Capture SyntheticWalker::Run(int steps) const {
         air > 0.0 ? 0.5 * 9.81 * air * (kFlightS - air) : -0.03 * std::sin(kPi * phase / kStanceS);
     now.pelvis_m = DVec3(0.0, kHipHeightM - 0.06 + bounce, kSpeed * t);
     for (int f = 0; f < 2; ++f) {
-      // Foot f stands in every second period, below the place of the pelvis in the middle of it.
+      // Foot f stands in every second period. It stands where the pelvis is in the middle of its
+      // stance.
       const double own = t - f * kPeriodS;
       const double stride = std::floor(own / (2.0 * kPeriodS));
       const double since = own - 2.0 * kPeriodS * stride;

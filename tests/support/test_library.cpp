@@ -54,7 +54,8 @@ RawExample MakeStep(Foot moving, double l0, double l1) {
   example.keytimes_s = {0.0, 0.15 * last_s, 0.85 * last_s, last_s};
   example.parameters = {-l0, l1};
   for (int f = 0; f < frames; ++f) {
-    // The fixed foot is l0/2 ahead of the start. The hips glide forward and the moving foot passes.
+    // The fixed foot is l0/2 ahead of the start. The hips move forward above it, and the moving
+    // foot passes it.
     const double s = static_cast<double>(f) / (frames - 1);
     const double ease = s * s * (3 - 2 * s);
     const double hips = ease * (l0 + l1) / 2;

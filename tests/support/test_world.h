@@ -86,7 +86,7 @@ inline std::vector<Quat> RotationsAt(double time_s) {
 struct AvatarAt {
   std::uint32_t avatar = 1;
   std::uint8_t flags = 0;
-  std::optional<Vec3> root_position_m = {};  ///< Replaces RootAt.
+  std::optional<Vec3> root_position_m = {};  ///< Default: the position that RootAt returns.
 };
 
 /// Returns the frame of one batch.

@@ -13,12 +13,12 @@ namespace stridewire {
 
 /// Change of velocities from one frame to the next.
 struct VelocityStep {
-  double joint_rad_s = 0.0;  ///< Of the joint whose angular velocity, as a vector, changes most.
+  double joint_rad_s = 0.0;  ///< Largest change of the angular velocity vector of a joint.
   double root_m_s = 0.0;
 };
 
-/// Measures poses frame by frame. Fingers and thumbs are ignored: in captures they twitch by up to
-/// 186 rad/s, which would allow any change in the other joints.
+/// Measures changes of velocity frame by frame. Fingers and thumbs are ignored: in captures they
+/// twitch by up to 186 rad/s, and a bound that allows this would not detect faults of other joints.
 class VelocitySteps {
  public:
   VelocitySteps(const Skeleton& skeleton, double fps)
@@ -31,7 +31,8 @@ class VelocitySteps {
     }
   }
 
-  /// Adds a pose and returns the change of velocity at the previous frame, zero for the first two.
+  /// Adds a pose and returns the change of velocity at the previous frame. Returns zero for the
+  /// first two poses.
   VelocityStep Add(ConstPoseSpan pose) {
     VelocityStep step;
     for (std::size_t j = 0; j < velocity_.size(); ++j) {

@@ -51,7 +51,8 @@ WebClient::~WebClient() = default;
 void WebClient::SendBytes(std::span<const std::byte> bytes) { SendFragment(bytes, true); }
 
 void WebClient::SendFragment(std::span<const std::byte> bytes, bool is_last) {
-  error_code ignored;  // the server has closed; received data can still be read
+  // An error means that the server has closed. Data that has arrived can still be read.
+  error_code ignored;
   stream_.write_some(is_last, asio::buffer(bytes.data(), bytes.size()), ignored);
 }
 
@@ -118,7 +119,7 @@ void WebClient::Abort() {
   stream_.next_layer().set_option(asio::socket_base::linger(true, 0), ignored);
   stream_.next_layer().close(ignored);
   context_.restart();
-  context_.run_for(kPatience);  // pending operations end with an error
+  context_.run_for(kPatience);  // Pending operations end with an error.
   set_closed();
 }
 

@@ -10,7 +10,7 @@
 
 namespace stridewire::test {
 
-/// What the figure of a case does.
+/// The movement of the figure in a case.
 enum class Movement {
   kWalk,   ///< Steps in any direction on any floor.
   kJump,   ///< A standing jump.
@@ -31,11 +31,11 @@ enum class Movement {
 
 [[nodiscard]] std::string_view MovementName(Movement movement);
 
-/// A generated BVH file and the truth about it.
+/// A generated BVH file and the true values of what importers measure in it.
 struct CorpusCase {
   Movement movement = Movement::kWalk;
   unsigned seed = 0;
-  std::string description;  ///< What was drawn, for messages.
+  std::string description;  ///< The random choices, for messages.
   std::string bvh;
   std::array<int, 2> steps{};  ///< Steps of the left and the right foot.
   int jumps = 0;
@@ -48,8 +48,8 @@ struct CorpusCase {
   double move_tolerance_m = 0.0;
 };
 
-/// Draws the file of a movement: body proportions, details of the movement, rig, axes, unit, frame
-/// rate and notation. The same seed always gives the same bytes.
+/// Generates a random BVH file of a movement. Body proportions, details of the movement, rig, axes,
+/// unit, frame rate and notation are random. The same seed always gives the same bytes.
 [[nodiscard]] CorpusCase DrawCase(Movement movement, unsigned seed);
 
 }  // namespace stridewire::test

@@ -120,7 +120,7 @@ void AddWalk(const Figure& figure, double fps, Random& random, DrawnMovement& dr
   if (Chance(random, 0.12)) InsertRestPose(figure, walk, random, drawn);
 }
 
-// A straight walk in the middle of the range of natural walks.
+// Returns a straight walk with parameters in the middle of the range of natural walks.
 WalkOptions PlainWalk(const Figure& figure, Random& random) {
   WalkOptions walk;
   walk.length_m = figure.scale() * random.Draw(0.5, 0.7);

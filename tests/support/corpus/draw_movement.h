@@ -9,7 +9,7 @@
 
 namespace stridewire::test {
 
-/// A random motion with its truth.
+/// A random motion and the true values of its measurements.
 struct DrawnMovement {
   FigureMotion motion;
   double declared_fps = 30.0;  ///< Differs from motion.fps if the file declares a wrong rate.

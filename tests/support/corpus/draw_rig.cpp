@@ -20,7 +20,7 @@ struct Orientation {
   DQuat turn;
 };
 
-// Turns of the world by which the file's axes differ from +Y up.
+// Returns the rotation of the world from +Y up to the axes of the file.
 Orientation DrawOrientation(Random& random) {
   const double quarter = 90.0 * kDegree;
   const Orientation up[] = {
@@ -28,13 +28,13 @@ Orientation DrawOrientation(Random& random) {
       {"z up", AboutX(quarter)},      {"z up", AboutX(quarter)},  {"-z up", AboutX(-quarter)},
       {"-y up", AboutX(2 * quarter)}, {"x up", AboutZ(-quarter)}, {"-x up", AboutZ(quarter)}};
   Orientation drawn = up[Below(random, std::size(up))];
-  // Most rigs face a constant direction; some face another side of the same axes.
+  // Most rigs face the same direction. Some are turned about the up axis.
   if (Chance(random, 0.3)) drawn.turn = drawn.turn * AboutY(quarter * Below(random, 4));
   return drawn;
 }
 
 void DrawExtraJoints(bool is_anonymous, Random& random, Rig& rig, std::string& text) {
-  // Without names, legs can be found by their shape only, so the rig stays plain.
+  // Legs without names can be found only by their shape, so their joints stay as they are.
   if (!is_anonymous && Chance(random, 0.2)) {
     const bool inside = Chance(random, 0.6);
     AddTwistJoints(inside ? TwistPlace::kInside : TwistPlace::kBeside, rig);

@@ -10,7 +10,7 @@
 namespace stridewire::test {
 
 /// Turns the plain figure into a random rig with random names, axes and unit. Returns a description
-/// of what was drawn.
+/// of the random choices.
 [[nodiscard]] std::string DrawRig(Movement movement, Random& random, Rig& rig);
 
 struct DrawnNotation {

@@ -69,8 +69,8 @@ class Figure {
   double scale_;
 };
 
-/// A pose given by what matters for contacts: the pelvis, both ankles and the rotation of both
-/// feet.
+/// A pose described by the values that determine contacts: position and rotation of the pelvis and
+/// of both feet. The remaining members are rotations of the upper body.
 struct FigurePose {
   struct LegPose {
     DVec3 ankle_m = DVec3(0.0);
@@ -96,8 +96,8 @@ struct FigurePose {
   void HangArms(double swing_rad);
 };
 
-/// Returns the rotation of every joint relative to its parent. Bends both legs by analytic inverse
-/// kinematics; an ankle that is out of reach is approached as far as the leg allows.
+/// Returns the rotation of every joint relative to its parent. Analytic inverse kinematics places
+/// the legs. If an ankle is out of reach, the leg is stretched towards it.
 [[nodiscard]] std::array<DQuat, kPartCount> LocalRotations(const Figure& figure,
                                                            const FigurePose& pose);
 

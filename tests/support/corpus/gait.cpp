@@ -61,7 +61,8 @@ class GaitRenderer {
     return pose;
   }
 
-  // 1 while the figure moves, 0 while it stands.
+  // Returns 1 while the figure moves, 0 while it stands, and values between while it starts or
+  // stops.
   double Activity(double t) const {
     const double in = Ease((t - gait_.path.front().time_s) / gait_.step_s);
     return in * Ease((gait_.path.back().time_s - t) / gait_.step_s);
@@ -103,7 +104,8 @@ class GaitRenderer {
     return speed * fall_s - 0.5 * kGravity * fall_s * fall_s;
   }
 
-  // Positive if the heel is raised, negative while a foot that landed with the heel becomes flat.
+  // Returns the pitch of a standing foot. It is positive if the heel is raised, and negative while
+  // a foot that landed with the heel becomes flat.
   double StandingPitch(const Footprint& print, double t) const {
     const double contact_s = print.lift_s - print.land_s;
     const double roll_s = std::min(kRollS, contact_s);
@@ -111,7 +113,7 @@ class GaitRenderer {
     return raised - gait_.heel_rad * (1.0 - Ease((t - print.land_s) / kHeelS));
   }
 
-  // How far the ball is from its footprint if a foot pitches up about its heel.
+  // Returns the vector from the footprint to the ball of a foot that pitches up about its heel.
   DVec3 BallAboveHeel(const Footprint& print, double pitch) const {
     const DVec3 heel(0.0, -figure_.AnkleHeight(), -0.06 * figure_.scale());
     const DVec3 arm = figure_.Ball() - heel;

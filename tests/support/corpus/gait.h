@@ -7,7 +7,7 @@
 
 namespace stridewire::test {
 
-/// A place where a foot stands, and when.
+/// A place where a foot stands, and the times at which it lands and lifts.
 struct Footprint {
   DVec3 ball_m = DVec3(0.0);
   double yaw_rad = 0.0;

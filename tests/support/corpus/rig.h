@@ -24,9 +24,9 @@ struct RigJoint {
   Channels channels = Channels::kRotation;
 };
 
-/// The motion of a figure as the joints of some character rig. The operations below change how the
-/// motion is represented; positions of the figure's joints in the world change only where a
-/// function says so.
+/// The motion of a figure, represented by the joints of a character rig. The functions below change
+/// the representation. They change world positions of the figure's joints only if their comments
+/// say so.
 struct Rig {
   double fps = 30.0;
   std::vector<RigJoint> joints;       ///< Parents first.
@@ -42,15 +42,15 @@ struct Rig {
   [[nodiscard]] std::vector<DVec3> Positions(int frame) const;
 };
 
-/// Represents a motion by one joint per part, with the motion of the pelvis at the root.
+/// Returns a rig with one joint per part of the figure, whose root is the pelvis.
 [[nodiscard]] Rig MakeRig(const Figure& figure, const FigureMotion& motion);
 
 /// Where AddTwistJoints inserts joints.
 enum class TwistPlace {
   kInside,  ///< Between hip and knee and between knee and ankle.
-  kBeside   ///< As children without children.
+  kBeside   ///< As additional children of the leg joints, without children of their own.
 };
-/// Adds joints that only twist. If they are inside the leg, they take over half of the twist.
+/// Adds joints that only twist. If they are inside the leg, they receive half of its twist.
 void AddTwistJoints(TwistPlace place, Rig& rig);
 
 void RemoveToes(bool with_end_site, Rig& rig);
@@ -64,7 +64,7 @@ enum class Roots {
   kStatic,      ///< A joint that never moves.
   kRotated,     ///< A joint that never moves, rotated by -90 degrees about x, at some offset.
   kTrajectory,  ///< A joint that moves along the floor; the hips move relative to it.
-  kSplit        ///< Position, heading and the remaining rotation belong to three joints.
+  kSplit        ///< Three joints: one for the position, one for the heading, one for the rest.
 };
 void AddRoots(Roots roots, Rig& rig);
 

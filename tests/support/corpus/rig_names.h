@@ -7,7 +7,7 @@
 
 namespace stridewire::test {
 
-/// How a program or data set names the joints of a person. `%` stands for the side.
+/// The joint names of a program or data set. `%` is a placeholder for the side.
 struct NameStyle {
   const char* label;
   const char* left;
@@ -15,8 +15,8 @@ struct NameStyle {
   /// Hips, upper leg, lower leg, foot, toes, spine, chest, neck, head, shoulder, upper arm, forearm
   /// and hand. If empty, joints are numbered.
   std::array<const char*, 13> names;
-  const char* twist;  ///< Added to the name of a twist joint.
-  /// True: the addition stands before the side ("thigh_twist_01_l"); otherwise at the end.
+  const char* twist;  ///< Text that is added to the name of a twist joint.
+  /// True: this text is before the side ("thigh_twist_01_l"). False: it is at the end.
   bool twist_before_side = false;
 
   [[nodiscard]] bool is_anonymous() const { return names[0] == nullptr; }
