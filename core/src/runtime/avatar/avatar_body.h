@@ -23,7 +23,8 @@ struct AvatarBody {
   LayerStack layers;
   Pose layered_pose;  ///< Pose with layers; empty until the first layer is set.
   bool has_layers = false;
-  /// True if the displayed feet are planted or, while standing still, would be planted in motion.
+  /// True if the current movement plants the feet. While the avatar stands still: true if its feet
+  /// were planted when it came to rest.
   bool plants_feet = false;
   bool begins_planting = false;  ///< True if the next movement is the first one with planted feet.
   Pose blended_pose;  ///< Pose without planting when the movement ended or was interrupted.
@@ -45,8 +46,9 @@ struct AvatarBody {
   /// Also evaluates `blended_pose` at `time_s`.
   void CaptureBlendSource(double time_s, bool keeps_speed);
 
-  /// Uses the displayed pose at `time_s` as the blended pose. Everything that the next movement
-  /// does not continue then fades out with the difference pose, and feet need no correction.
+  /// Uses the displayed pose at `time_s` as the blended pose. The next movement then blends from
+  /// the displayed pose as a whole, so that the corrections of the feet fade out with the
+  /// difference pose.
   void UseDisplayedAsBlended(double time_s, bool keeps_speed);
 
   /// Stores the positions of planted feet for a movement that ends at `time_s`. Call

@@ -40,8 +40,8 @@ StepMeasures MeasuresOf(const RequestTarget& target, double outward) {
   return {target.vector_m.z, outward * target.vector_m.x, target.vector_m.y, target.turn_rad};
 }
 
-// Describes the length of a step, and those of its other measures that differ from the requested
-// ones.
+// Returns a text with the length of a step, and with those of its other measures that differ from
+// the requested ones.
 std::string MeasuresText(const StepMeasures& step, const FootprintError& missed) {
   constexpr double kVisible = 0.005;
   std::string text;
@@ -90,7 +90,8 @@ void AvatarSimulation::RejectOutOfReach(const MovementRequest& request, const Re
   const RequestError error = PlannedError(plan);
   const Foot foot = IsStep(kind) ? MovingFoot(kind) : Foot::kLeft;
   const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
-  // The path of a step starts at the fixed foot, in the heading after the step.
+  // The target of a step is relative to the fixed foot and to the heading after the step. The
+  // target of a jump is relative to the base frame (RequestTarget).
   const DVec3 from_m = IsStep(kind) ? StandingPosition(OtherFoot(foot)) : base_.position_m;
   const double heading_rad = base_.heading_rad + (IsStep(kind) ? error.reached.turn_rad : 0.0);
   FootprintError missed{.nearest = {from_m + RotateYaw(heading_rad, error.reached.vector_m),

@@ -18,7 +18,8 @@ constexpr double kMaxSwingBackM = 0.06;
 // Distance ahead of its current position at which a foot that has to land early lands, in metres.
 constexpr double kEarlyLandingM = 0.12;
 
-// Returns the request for a step that another request requires. Its plan is never out of reach.
+// Returns a request for a step that the avatar plans itself, during a walk or to bring the feet
+// together. Because of allow_nearest, it is not rejected as out of reach.
 MovementRequest PlannedStep(std::uint64_t id) {
   return {.id = id, .movement = StepRequest{.allow_nearest = true}};
 }
@@ -103,8 +104,9 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanEarlyLanding(
   return Redirection{*plan, {.movement = step}, true, false};
 }
 
-// Plans how the current step changes for the request at the head of the queue: into a step of the
-// same foot to the place that the request requires. Returns nullopt if the step must land first.
+// Plans a step that replaces the current one for the request at the head of the queue. It moves the
+// same foot to the place that the request requires. Returns nullopt if the current step must land
+// first.
 std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(double phase) {
   const MovementRequest& request = queue_[queue_head_];
   const Foot moving = MovingFoot(group().kind);

@@ -16,7 +16,8 @@ namespace {
 // Limits on the numbers in a record, in metres, seconds or radians, and on weights.
 constexpr double kMaxNumber = 1e9;
 constexpr float kMaxWeight = 1e3f;
-// Tolerance for the squared length of quaternions. Products of rotations need it.
+// Tolerance for the squared length of unit quaternions and normals. Rounding changes the lengths of
+// products of quaternions.
 constexpr float kUnitTolerance = 0.02f;
 
 }  // namespace

@@ -37,7 +37,8 @@ class ReplicaEvaluator {
 /// with the length of the avatar's tick.
 class AvatarReplica {
  public:
-  /// The replica is unknown until it receives a state. `library` must be the avatar's library.
+  /// The avatar's state is unknown until the replica receives a record with a whole state.
+  /// `library` must be the avatar's library.
   explicit AvatarReplica(std::shared_ptr<const MotionLibrary> library);
 
   /// Returns true if a record contains a whole state, false if it contains a change.
@@ -48,11 +49,12 @@ class AvatarReplica {
   ///
   /// Errors: kMalformed if the record is invalid, or does not fit the library or the current state.
   /// kNotFound if a change arrives before any state. Error::index is the offset in the record.
-  /// After an error, the replica is unknown until the next state.
+  /// After an error, the avatar's state is unknown until the next record with a whole state.
   [[nodiscard]] Status Apply(std::span<const std::byte> record, FootPlanScratch& scratch);
 
   /// Advances replicas by one tick and evaluates their poses. All must have the same library, and
-  /// each may occur only once. Unknown replicas are skipped. A movement that does not change is
+  /// each may occur only once. Replicas without a known state are skipped. A movement that does not
+  /// change is
   /// evaluated for several ticks at once, which reads the library less often. Pass the replicas in
   /// the same order in every tick, because their positions determine in which ticks they are
   /// evaluated. `dt_s` must be the same in all calls, unless the replica receives a state in
@@ -62,7 +64,7 @@ class AvatarReplica {
 
   /// True if the replica has received a state, and no error has occurred since then.
   [[nodiscard]] bool is_known() const { return is_known_; }
-  /// The displayed pose in world space, after AdvanceAll. Undefined while the replica is unknown.
+  /// The displayed pose in world space, after AdvanceAll. Undefined unless is_known().
   [[nodiscard]] ConstPoseSpan pose() const {
     return is_moving_ && !body_.has_layers ? AheadPose(ahead_index_ - 1) : body_.DisplayedPose();
   }

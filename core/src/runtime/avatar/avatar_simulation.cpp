@@ -441,7 +441,8 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   }
   auto plan = PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
                             base_.heading_rad, feet_, FootprintUse::kRequested);
-  // The whole pose determines whether a leg reaches a footprint, so such a step must not be varied.
+  // The whole pose determines whether a leg reaches a footprint exactly, so a step with exact
+  // placement must not be varied.
   if (plan) plan->is_varied = !step.exact_only;
   return plan;
 }
@@ -488,8 +489,8 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
 // Starts the movement that was just planned.
 void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
   const MotionGroup& next = group();
-  // If planting reaches the requested footprint, the step is not clamped, even if its parameters
-  // are.
+  // If planting reaches the requested footprint, the step is not reported as clamped, even if its
+  // parameters are.
   const bool is_met = plan.exact && body_.movement.feet.is_active &&
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;

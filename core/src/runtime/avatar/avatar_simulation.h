@@ -202,7 +202,7 @@ class AvatarSimulation {
   // A step that replaces the current step of the same foot while it is in progress.
   struct Redirection {
     RequestPlan plan;
-    MovementRequest request;     // Requested step or, for other steps, the id of their request.
+    MovementRequest request;     // The requested step, or one that the avatar plans itself.
     bool is_inserted = false;    // True if no request contains the step.
     bool ends_interrupt = true;  // False if the interrupting request starts after this step.
   };
@@ -311,8 +311,8 @@ class AvatarSimulation {
   // Number of successive inserted steps, including the current movement.
   int inserted_steps_ = 0;
   std::uint64_t movement_number_ = 0;  // Number of movements that have begun.
-  double start_not_before_s_ = 0.0;    // Avatar time.
-  // Avatar time at which the last movement with a velocity ended; -1 if unknown.
+  double start_not_before_s_ = 0.0;    // Avatar time before which no queued request may start.
+  // Avatar time at which the last movement ended, if the next one can keep its velocity; else -1.
   double moved_until_s_ = -1.0;
 
   AvatarOptions options_;

@@ -58,7 +58,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanClosingStep() const {
   return second && miss_of(*second) <= largest_miss_m ? plan : std::nullopt;
 }
 
-// Returns the place of a foot in a stand in which `fixed` is the other foot.
+// Returns where the other foot has to be so that the feet are together. `fixed` stays in its place.
 DVec3 AvatarSimulation::PlaceBeside(Foot fixed) const {
   const DVec3 vector = stand_feet_.Vector(OtherFoot(fixed));
   return StandingPosition(fixed) + RotateYaw(base_.heading_rad, DVec3(vector.x, 0.0, vector.z));

@@ -9,7 +9,7 @@ namespace {
 constexpr double kTickS = 1.0 / 30.0;
 // A walk that takes longer than this is cancelled.
 constexpr int kMaxTicks = 60 * 30;
-// Length of a walk with steady strides between its first and last steps.
+// Lengths of walks that are long enough for steady strides between the first and the last steps.
 constexpr double kFastWalkM = 8.0;
 constexpr double kSlowWalkM = 3.0;
 

@@ -14,8 +14,8 @@ namespace stridewire {
 /// planting adds to the blended foot at that time.
 struct FootLock {
   Footprint print;
-  double height_m = 0.0;
-  double turn_rad = 0.0;
+  double height_m = 0.0;  ///< Height that is added to the blended foot.
+  double turn_rad = 0.0;  ///< Turn that is added to the blended foot.
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
   double root_weight = 0.5;
 };

@@ -24,10 +24,11 @@ constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
 constexpr double kMaxRootSinkM = 0.3;
 // Largest shift of the root towards the centre between the feet.
 constexpr double kMaxCentreShiftM = 0.1;
-// A leg whose foot descends by kFullDescentM or more lands with at most kDescentExtension of its
-// length, so that its knee is still bent. If it descends less, the limit is between this and
-// kLongestExtension. A knee that is nearly straight turns abruptly while the foot falls. The limit
-// holds from kBentLanding (fraction of the swing) on.
+// A leg whose foot descends by kFullDescentM or more is extended to at most kDescentExtension of
+// its length when it lands, so that its knee is still bent. For smaller descents, the limit is
+// between kDescentExtension and kLongestExtension. Without this limit, the knee would bend abruptly
+// while the foot descends, because it was nearly straight. The limit applies after the fraction
+// kBentLanding of the swing.
 constexpr double kDescentExtension = 0.97;
 constexpr double kFullDescentM = 0.15;
 constexpr double kBentLanding = 0.85;
@@ -41,8 +42,8 @@ constexpr double kMaxAsideM = 0.05;
 // at most kMaxEarlyLiftM.
 constexpr double kLevelClearanceM = 0.012;
 constexpr double kMaxEarlyLiftM = 0.03;
-// A foot that leaves the ground before this fraction of the blend-in of its movement is not
-// corrected fully.
+// A foot that leaves the ground before the fraction kLeastSettled of the blend-in of its movement
+// is not corrected fully. Samples before the fraction kMostlySettled do not change the correction.
 constexpr double kLeastSettled = 0.2;
 constexpr double kMostlySettled = 0.7;
 
@@ -195,7 +196,8 @@ class Planner {
         movement_.base.heading_rad + movement_.heading_change_rad + movement_.extra_turn_rad;
     const DVec3 blended = RotateYaw(-end_heading_rad, EndVector(OtherFoot(moving), moving));
     // Left and right steps of a capture are not equally wide. If each foot were placed only
-    // relative to the other, the walk would drift sideways. Therefore, steer back towards the line.
+    // relative to the other, the walk would drift sideways. Therefore, steps are steered back
+    // towards LandingTarget::line_m.
     const double aside_m =
         std::clamp(RotateYaw(-end_heading_rad, target.line_m - movement_.base.position_m).x,
                    -kMaxAsideM, kMaxAsideM);
@@ -276,8 +278,9 @@ class Planner {
   }
 
   // Returns the height to add to the moving foot of a step between the end of the blend-in and its
-  // release, so that its sole stays on the ground at height `ground_m`. `start_m` is the height at
-  // the start, `settled_m` the height without levelling.
+  // release, so that its sole stays on the ground at height `ground_m`. `start_m` is the added
+  // height at the start, and `settled_m` the added height at the end of the blend-in without
+  // levelling.
   double ReleaseHeight(Foot moving, double ground_m, double start_m, double settled_m) const {
     const auto settled_at = [&](double time_s) {
       return 1.0 - EaseOut((time_s - movement_.start_offset_s) / movement_.ease_out_s);
@@ -411,9 +414,9 @@ class Planner {
     return std::min(push_m, kMaxPushM);
   }
 
-  // Returns the shift that takes the root to the centre between both feet by the end of a step,
-  // where the blend has it. The root follows the supporting foot. If the other foot lands elsewhere
-  // than in the blend, the body would otherwise lean towards the supporting foot.
+  // Returns the shift of the root by the end of a step: half of the distance by which the moving
+  // foot lands elsewhere than in the blend, relative to the supporting foot. The root follows the
+  // supporting foot. Without the shift, the body would lean towards that foot.
   DVec3 ShiftToCentre(Foot moving) const {
     const FootPlan& plan = movement_.feet;
     const Foot fixed = OtherFoot(moving);

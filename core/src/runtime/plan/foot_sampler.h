@@ -13,9 +13,9 @@
 
 namespace stridewire {
 
-/// Computes the feet of a movement, before planting, at several times at once. Evaluates the times
-/// side by side, and only the joints of the legs. The results have the same bits as those of
-/// EvaluateMovement or EvaluateBlend followed by FootOf.
+/// Computes the feet of a movement, before planting, at several times at once. It evaluates only
+/// the joints of the legs, with SIMD and one time per lane. The results have the same bits as those
+/// of EvaluateMovement or EvaluateBlend followed by FootOf.
 class FootSampler {
  public:
   static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Maximum number of times per call.
@@ -36,11 +36,13 @@ class FootSampler {
   [[nodiscard]] DVec3 Ball(std::size_t i, Foot foot) const;
   /// Returns a foot at time `i`.
   [[nodiscard]] BlendedFoot FootAt(std::size_t i, Foot foot) const;
-  /// Returns the height of a foot at time `i`, in world space (LegPose::LowestSole).
+  /// Returns the height of the sole at time `i`, in world space: LegPose::LowestSole plus the
+  /// height of the root.
   [[nodiscard]] double LowestSole(std::size_t i, Foot foot) const;
-  /// Returns the smaller of the heights of ball and ankle, each above its height at rest.
+  /// Returns the smaller of the heights of ball and ankle. From each, the height of the joint in a
+  /// flat, standing foot is subtracted.
   [[nodiscard]] double LowestFlatSole(std::size_t i, Foot foot) const;
-  /// Returns the smallest of the heights of ball, ankle and toe tip, each above its height at rest.
+  /// Same as LowestFlatSole, but also considers the toe tip.
   [[nodiscard]] double LowestPoint(std::size_t i, Foot foot) const;
 
  private:

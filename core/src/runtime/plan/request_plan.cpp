@@ -38,9 +38,9 @@ constexpr double kStraightPreferenceM = 0.15;
 // Additional cost of a group whose steps were generated because the captures lack them. Captured
 // steps are preferred if they fit nearly as well.
 constexpr double kCompletedCostM = 0.02;
-// In libraries with such groups, captured groups have an additional cost far from their examples.
-// With few examples and many parameters, most of the hull is far from all examples, and blends
-// there are poor.
+// In libraries with generated groups (MotionGroup::is_completed), captured groups have an
+// additional cost far from their examples. With few examples and many parameters, most of the hull
+// is far from all examples, and blends there are poor.
 constexpr double kNearExampleM = 0.15;
 constexpr double kFarExampleWeight = 0.5;
 // Additional cost per metre outside the hull of the examples, where requests may extrapolate.

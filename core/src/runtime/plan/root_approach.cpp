@@ -91,8 +91,8 @@ void PlanRootApproach(const FootPlanJob& job) {
     }
     return root;
   };
-  // On terrain, the root also approaches its height if it rises. Otherwise, the legs of an avatar
-  // that has climbed would straighten while the difference pose fades out.
+  // On terrain, the approach includes the height if the root has to rise. Otherwise, the legs of an
+  // avatar that has climbed would straighten while the difference pose fades out.
   const bool rises = plan.keeps_above_ground && above_feet(0).y < above_feet(2).y;
   const auto offset_at = [&](std::size_t i) {
     DVec3 offset = above_feet(i) - above_feet(i + 2);
@@ -112,7 +112,8 @@ void PlanRootApproach(const FootPlanJob& job) {
   const double most_s = std::min(longest_s, movement.duration_s() - start_s);
   DVec3 residual_m = plan.root_residual_m;
   DVec3 residual_m_s = plan.root_residual_m_s;
-  // The vertical component fades over kRootRisePart of the movement.
+  // The vertical component of the residual fades out more slowly, over the fraction kRootRisePart
+  // of the movement, so it is ignored here.
   residual_m.y = residual_m_s.y = 0.0;
   plan.root_approach = {.offset_m = offset_m,
                         .offset_m_s = offset_m_s,

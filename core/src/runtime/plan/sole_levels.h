@@ -8,7 +8,7 @@ namespace stridewire {
 
 // Standing soles may be up to kMaxHoverM above and kMaxSinkM below the ground, because captures do
 // not determine the height of the sole exactly. Beyond these limits, the height of the foot is
-// corrected by up to kMaxLevelM. Larger differences are not errors of the blend.
+// corrected by up to kMaxLevelM.
 inline constexpr double kMaxHoverM = 0.006;
 inline constexpr double kMaxSinkM = 0.003;
 inline constexpr double kMaxLevelM = 0.05;
@@ -21,7 +21,7 @@ inline constexpr std::array<double, 16> kStanceSamples{
 inline constexpr std::array<std::size_t, 5> kLevelSamples{0, 4, 7, 10, 15};
 inline constexpr double kStanceSlackM = 0.002;
 
-/// A polynomial of degree 4 in the fraction of a movement.
+/// A polynomial of degree 4 in the elapsed fraction of a movement.
 struct Quartic {
   double constant = 0.0;
   std::array<double, 4> coefficients{};  ///< Of u, u^2, u^3 and u^4.

@@ -36,8 +36,8 @@ constexpr double kMaxLooseErrorRad = 0.5;
 // kMaxExtraTurnRad, libraries without steps that turn on the spot would need ten steps for a
 // half-turn.
 constexpr double kMaxWalkTurnRad = 0.6;
-// These limits apply when looking ahead. The next step itself may exceed them a little, because
-// feet do not land exactly as predicted.
+// When the planner looks ahead, the limits on distances and angles above apply as they are. For the
+// next step itself they are multiplied by kSlack, because feet do not land exactly as predicted.
 constexpr double kSlack = 1.05;
 // After a step that is not longer than this, the body is above both feet.
 constexpr double kForwardM = 0.2;
@@ -92,7 +92,7 @@ constexpr double kEasyClimbM = 0.18;
 constexpr double kEasySlopeClimbM = 0.15;
 constexpr float kSlopeNormalY = 0.985f;
 constexpr double kLeastClimbM = 0.05;
-// If this is not possible, steps longer than kLongClimbM end before the edge instead.
+// If no fraction leads onto such ground, steps longer than kLongClimbM end in front of the edge.
 constexpr double kLongClimbM = 0.55;
 constexpr std::array<double, 6> kShorterSteps{0.9, 0.8, 0.7, 0.6, 0.5, 0.4};
 

@@ -71,8 +71,8 @@ struct WalkDecision {
   const char* reason = "";
 };
 
-/// Limits of a walk. It ends after kMaxStepsWithout steps without progress. If it makes a detour
-/// around ground that does not support a foot, it ends after kMaxDetourSteps such steps.
+/// Limits of a walk. It ends after kMaxStepsWithout successive steps without progress, or after
+/// kMaxDetourSteps of them if it makes a detour around ground that does not support a foot.
 inline constexpr int kMaxWalkSteps = 10'000;
 inline constexpr int kMaxStepsWithout = 2;
 inline constexpr int kMaxDetourSteps = 16;

@@ -39,9 +39,9 @@ constexpr double kNearM = 0.5;
 constexpr double kSideEffort = 1.5;
 
 // If the goal is further away than kMaxShiftM, an avatar turns and walks forward. It may reach
-// closer goals with steps sideways or backward. For libraries whose longest step backward is
-// shorter than kBackM, the limit is kMaxShiftWithoutBackM, because they have to combine other
-// steps.
+// closer goals with steps sideways or backward. With libraries whose longest step backward is
+// shorter than kBackM, the limit is kMaxShiftWithoutBackM, because avatars then have to combine
+// other steps.
 constexpr double kMaxShiftM = 2.0;
 constexpr double kMaxShiftWithoutBackM = 1.3;
 constexpr double kBackM = 0.2;
@@ -69,9 +69,10 @@ constexpr double kCurveM = 0.6;
 constexpr double kMaxCurveRad = 1.9;
 constexpr double kCurveFadeRad = 0.6;
 
-// A distance is divided into fewer steps if these are at most this fraction longer than comfortable
-// ones.
+// The distance to walk is divided into equal steps. It may exceed a whole number of comfortable
+// steps by this fraction of a step before the walk takes another step.
 constexpr double kStretch = 0.15;
+// Expected duration of the first step of a walk.
 constexpr double kFirstStepS = 0.6;
 constexpr double kShortestStepM = 0.2;
 
@@ -245,8 +246,8 @@ double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const 
   return HeadingTo(way - RotateYaw(approach_.heading_rad, DVec3(0.0, 0.0, curve_m)));
 }
 
-// Returns true if stepping sideways or backward, or turning on the spot, is expected to take no
-// longer than walking.
+// Returns true if steps sideways, backward or on the spot are expected to reach the goal as fast as
+// walking forward, or faster.
 bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   if (!is_last_leg) return false;
   const DVec3 way = approach_.position_m - body.position_m;
@@ -316,7 +317,8 @@ std::span<const Foot> WalkSteering::FeetToMove(std::size_t next_waypoint) {
           kTogetherRad;
   if (!is_together) return std::span(feet_).first(1);
 
-  // From a stand, either foot may step first. Prefers the foot on the side of the turn or the path.
+  // From a stand, either foot may step first. The foot on the side of the turn or of the path is
+  // preferred.
   Foot first = expected;
   const auto towards = [&](double value, double least) {
     if (std::fabs(value) > least) first = value > 0.0 ? Foot::kLeft : Foot::kRight;

@@ -5,10 +5,13 @@
 
 namespace stridewire {
 
-/// Rotates the joints of `pose` towards the clip at `time_s`: r slerp(1, r^-1 c, weight * mask),
-/// along the short arc. The clip is C1 between its keys (Catmull-Rom). The time wraps around in a
-/// loop and is clamped in other clips. `weight` is in [0, 1]. Never allocates. Joints outside the
-/// mask do not change.
+/// Rotates the joints of `pose` towards their rotations in the clip at `time_s`. A rotation r
+/// becomes r slerp(1, r^-1 c, w) along the short arc, where c is the rotation in the clip and w is
+/// `weight`, in [0, 1], times the joint's weight in LayerClip::weights. Joints that are not in the
+/// clip do not change.
+///
+/// The keys of the clip are interpolated with continuous velocity (Catmull-Rom). In looping clips
+/// the time wraps around; in other clips it is clamped. Never allocates.
 void ApplyLayer(const LayerClip& clip, double time_s, double weight, PoseSpan pose);
 
 }  // namespace stridewire
