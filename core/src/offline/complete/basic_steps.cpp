@@ -58,14 +58,15 @@ class BasicStepList {
   [[nodiscard]] double full() const {
     return 0.5 * (stride().start_length_m + stride().end_length_m);
   }
-  // Returns the sideways distance between the feet if one is `length_m` ahead of the other. It
-  // changes from that of the stand pose to that of the captured strides as the length increases.
+  // Returns the sideways distance between the feet if one is `length_m` ahead of the other. For
+  // length 0 it is the distance in the stand pose. It approaches the distance in the captured
+  // strides as the length increases.
   [[nodiscard]] double Width(double length_m) const {
     const double share = std::min(1.0, length_m / full());
     return stand_width() + share * (std::max(stride().width_m, kMinStrideWidthM) - stand_width());
   }
-  // Returns the fraction of the forward distance between the feet in the stand pose that remains in
-  // a step of this length.
+  // Returns the forward distance between the feet of the stand pose, reduced in proportion to the
+  // length of the step. In full strides nothing of it remains.
   [[nodiscard]] double StandOffset(double length_m) const {
     return person_.StandVector(foot_).z * (1.0 - std::min(1.0, length_m / full()));
   }

@@ -34,8 +34,8 @@ constexpr double kBackwardSlowdown = 1.15;
 // little before the toe-off detected in the captures, and rests a little after the heel-strike.
 constexpr double kSwingBegin = 0.92;
 constexpr double kSwingEnd = 2.06;
-// Minimum fraction of the captured stride in pitch and height of the foot in the middle of a swing.
-// It prevents feet from dragging in short steps.
+// Minimum weight of the captured stride in the middle of a swing, for the rotation and the height
+// of the foot. It prevents feet from dragging along the ground in short steps.
 constexpr double kMinSwingShare = 0.45;
 // Minimum heights of the ball and of the toe tip during a swing. The foot is lifted in increments
 // of kLiftStepM until it reaches them.
@@ -426,8 +426,7 @@ class StepGenerator {
   }
 
   // Returns how far the root is lowered at each moment so that the legs reach the feet. At both
-  // ends the lowering depends only on the state of the avatar, so that successive steps fit
-  // together.
+  // ends, the lowering depends only on the pose at that end, so that successive steps fit together.
   [[nodiscard]] std::vector<double> Lowering(const std::vector<Moment>& moments) const {
     constexpr int kRounds = 3;
     constexpr int kHalf = 10;

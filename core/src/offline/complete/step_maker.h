@@ -46,8 +46,8 @@ struct StepFeet {
 [[nodiscard]] RawExample MakeStep(const Person& person, Foot moving, const StepFeet& feet,
                                   std::span<const ParameterName> names, std::string source);
 
-/// Generates a step backward by reversing a forward step with exchanged ends in time. The moving
-/// foot is in front in `feet.start_m` and behind in `feet.end_m`.
+/// Generates a step backward: a forward step from `feet.end_m` to `feet.start_m`, played in
+/// reverse. The moving foot is in front in `feet.start_m` and behind in `feet.end_m`.
 [[nodiscard]] RawExample MakeBackwardStep(const Person& person, Foot moving, const StepFeet& feet,
                                           std::span<const ParameterName> names, std::string source);
 

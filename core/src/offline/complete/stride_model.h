@@ -27,8 +27,8 @@ struct StrideModel {
   /// Sideways distance of the moving from the fixed foot, outwards; mean of start and end.
   double width_m = 0.0;
 
-  /// Velocities of the root where the stride continues another stride, in m/s. After JoinStrides
-  /// they are equal to those of the other foot's stride.
+  /// Velocities of the root at the ends of the stride, in m/s. After JoinStrides, the velocity at
+  /// the end of one foot's stride equals that at the start of the other foot's stride.
   DVec3 start_velocity = DVec3(0.0);
   DVec3 end_velocity = DVec3(0.0);
 

@@ -14,9 +14,9 @@ namespace {
 
 // The resting height of a ball is measured only if the ball rests for at least this time.
 constexpr double kBallStillMinS = 0.03;
-// If no foot is on the ground for a shorter time than this, the figure is not jumping.
+// If both feet are off the ground for less than this, the figure is not jumping.
 constexpr double kFlightMinS = 0.15;
-// While a foot rolls off slowly, it may stop for up to this time.
+// A contact that is shorter than this may be a moment at which a foot stops while it rolls off.
 constexpr double kRollOffMaxS = 0.2;
 
 // Returns the height of the resting ball: the lower quartile over the frames in which the ball

@@ -23,7 +23,7 @@ constexpr double kSameHeightM = 0.04;
 constexpr double kLandingMaxS = 0.2;
 constexpr double kHeelStrikeM = 0.08;
 // Before and after a contact, a slow foot may rest at another height. This counts as a contact if
-// it lasts at least this fraction of the shortest contact.
+// it lasts at least this fraction of ContactOptions::contact_min_s.
 constexpr double kRestMinShare = 0.5;
 
 using Flags = std::vector<char>;

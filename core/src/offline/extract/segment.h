@@ -12,10 +12,11 @@ namespace stridewire {
 struct SegmentOptions {
   /// Maximum time between the swing and the start or end of a step, while both feet stand.
   double standing_max_s = 0.4;
-  double swing_min_s = 0.1;           ///< Minimum duration of a swing.
-  double swing_max_s = 2.0;           ///< Maximum duration of a swing.
-  double moved_min_m = 0.04;          ///< In a step, the foot moves by at least this distance, or
-  double turned_min_rad = 0.09;       ///< it turns by at least this angle.
+  double swing_min_s = 0.1;  ///< Minimum duration of a swing.
+  double swing_max_s = 2.0;  ///< Maximum duration of a swing.
+  /// In a step, the foot moves by at least moved_min_m or turns by at least turned_min_rad.
+  double moved_min_m = 0.04;
+  double turned_min_rad = 0.09;
   double support_slide_max_m = 0.12;  ///< Maximum motion of the other foot's ball during a swing.
   double flight_min_s = 0.15;         ///< Minimum duration of the flight of a jump.
   double flight_max_s = 1.0;          ///< Maximum duration of the flight of a jump.

@@ -18,8 +18,9 @@
 namespace stridewire {
 namespace {
 
-// Minimum acceleration of a falling pelvis. In captured jumps it is -9.5 to -11.8 m/s^2, because
-// arms and legs swing. For a figure that hangs on a bar it is near 0.
+// Range of the vertical acceleration of the pelvis in free fall. In captured jumps, the
+// acceleration is -11.8 to -9.5 m/s^2, because arms and legs swing. For a figure that hangs on a
+// bar, it is near 0.
 constexpr double kFallMin_m_s2 = -15.0;
 constexpr double kFallMax_m_s2 = -5.0;
 constexpr double kGravity_m_s2 = -9.81;
@@ -39,7 +40,8 @@ constexpr double kRunFlightMinS = 0.04;
 constexpr double kRunFeetApartS = 0.1;
 // If the pelvis has risen by this much, it has passed its lowest point.
 constexpr double kPastLowestM = 0.03;
-constexpr double kNextCrouchM = 0.05;  // If it then descends by this much, the next crouch begins.
+// If the pelvis then descends by this much, the next crouch begins.
+constexpr double kNextCrouchM = 0.05;
 // A standing figure has risen from the crouch by at least this fraction of its depth.
 constexpr double kUprightShare = 0.6;
 // A standing figure may move at up to this many times still_m_s.
