@@ -197,8 +197,8 @@ class Pose:
     rotations_xyzw: NDArray[np.float32]
     discontinuity: bool  #: RAW: True if the previous pose must not be interpolated with this one.
     standing: bool  #: True: the avatar stands and has no request.
-    #: Number of the continuous motion, also of sampled poses. Poses of different segments must not
-    #: be blended, because the avatar has teleported or the client has reconnected in between.
+    #: Poses with equal segments belong to one continuous motion. Poses with different segments must
+    #: not be blended, because the avatar has teleported or the client has reconnected in between.
     segment: int
 
 

@@ -131,16 +131,16 @@ namespace Stridewire
         /// <summary>PoseKind.Raw: true if clients must not interpolate between the pose before and
         /// this one.</summary>
         public bool Discontinuity;
-        /// <summary>Number of the continuous motion. If it differs from that of the pose that was
-        /// displayed before, the two must not be blended.</summary>
+        /// <summary>Poses with equal segments belong to one continuous motion. Poses with different
+        /// segments must not be blended.</summary>
         public uint Segment;
         /// <summary>True: the avatar stands and has no request.</summary>
         public bool Standing;
         public PoseDetail Detail;
     }
 
-    /// <summary>How the display follows the connection. Times are 0 before the first pose.
-    /// </summary>
+    /// <summary>Describes how the render time adapts to the connection. Times are 0 before the
+    /// first pose.</summary>
     public struct Playout
     {
         /// <summary>Delay of the render time behind the server time in seconds.</summary>

@@ -47,15 +47,17 @@ export interface LibraryCache {
 
 /** Options of a client. Only `url` is required. */
 export interface ClientOptions {
-  /** Address of the server: `ws://host:port/stream`, or the same with `wss`. Or 1 to 16 addresses
-   * of servers that offer the same worlds. The client tries them in order, and after a lost
-   * connection first the one it was connected to. A session continues only on the same server. */
+  /** Address of the server, `ws://host:port/stream` or `wss://host:port/stream`, or a list of 1 to
+   * 16 addresses of servers that offer the same worlds. The client tries the addresses in order.
+   * After a lost connection it first tries the address to which it was connected, because a session
+   * continues only on the same server. */
   url: string | readonly string[];
   /** Name of this client for the server's log, 1 to 64 bytes. Default `stridewire-web`. */
   clientName?: string;
   /** Token for servers that require one, at most 4096 bytes. Default empty. */
   authToken?: string;
-  /** WebSocket class to use. Default: the global one. In Node.js, pass that of the package `ws`. */
+  /** WebSocket class to use. Default: the global class. In Node.js, pass the class of the package
+   * `ws`. */
   webSocket?: new (url: string) => WebSocketLike;
   /** Delay of `Client.renderTimeS` behind server time in seconds, at most 60. If it is negative,
    * which is the default, the delay adapts to the connection. */
@@ -178,9 +180,9 @@ export interface Statistics {
   /** Smoothed time from the sampled time to the newest received pose. Negative if samples are newer
    * than all poses, so that poses are extrapolated or held. */
   interpolationDelayS: number;
-  /** Samples after the newest received pose of their avatar whose motion continued. */
+  /** Samples after the newest received pose of their avatar, while its motion still continued. */
   extrapolatedSamples: number;
-  /** Samples after the newest received pose of their avatar whose motion had stopped. */
+  /** Samples after the newest received pose of their avatar, when its motion had stopped. */
   heldSamples: number;
   /** Mean time in nanoseconds to decode and store a pose. */
   decodeNsPerPose: number;

@@ -12,8 +12,7 @@ export function makeReply(code: number, text: string, message?: ReplyMessage): R
     ok: code === 0,
     code,
     status: statusName(code),
-    // If the server refused only items, the session has used the status of the first of them as
-    // `code`.
+    // If the server refused only some items, `code` is the status of the first of them.
     text: text || items.find((item) => item.code === code)?.text || statusText(code),
     accepted: message?.accepted ?? 0,
     items,
@@ -22,7 +21,7 @@ export function makeReply(code: number, text: string, message?: ReplyMessage): R
 
 /**
  * Makes the reply to a command that was not sent because of this error. Throws the error if the
- * WebAssembly module has stopped, because then nothing works any more.
+ * WebAssembly module has stopped, because the client can then no longer work.
  */
 export function refusal(error: unknown): Reply {
   if (error instanceof WebAssembly.RuntimeError) throw error;

@@ -505,8 +505,8 @@ export class Session {
       const hash = native().text;
       if (request === 1) {
         // The promises below also handle exceptions of the cache. The timeout consists of several
-        // short timers. While a page is busy, the cache cannot answer, but only one of the timers
-        // can elapse.
+        // short timers, because a busy page cannot receive the cache's answer. However long the
+        // page is busy, only one of the timers elapses meanwhile.
         let timer: ReturnType<typeof setTimeout>;
         const wait = (seconds: number): void => {
           if (seconds === 0) this.onLibrary(hash, null);
@@ -573,7 +573,7 @@ export class Session {
           this.detach();
           break;
         case eventTypes.reply: {
-          // Other replies result from the message as well, but it does not describe them.
+          // A frame can cause replies to several commands, but describes only one of them.
           const reply = frame !== undefined && command === this.answered
               ? read() as ReplyMessage : undefined;
           const pending = this.pending.get(command);

@@ -449,7 +449,7 @@ export interface Skeleton {
  * Origin of a sampled pose.
  * - `interpolated`: from the received poses around the sampled time, or exactly a received one.
  * - `extrapolated`: the next pose has not arrived. The motion continues, and stops after 0.25 s.
- * - `held`: a pose that does not move, because no continuous pose follows.
+ * - `held`: the motion has stopped, because no later pose continues it.
  * - `missing`: no pose is known for that time, and the output is not valid.
  */
 export type PoseKind = 'interpolated' | 'extrapolated' | 'held' | 'missing';
@@ -470,9 +470,9 @@ export interface Pose {
   detail: PoseDetail;
   /** If the pose is extrapolated or held: time since the last received pose. Otherwise 0. */
   heldS: number;
-  /** Number of the continuous motion. If it differs from that of the pose that was displayed
-   * before, the avatar has teleported, the client has reconnected, or poses arrived after the
-   * extrapolation had ended: do not blend the two poses. */
+  /** Poses with equal segments belong to one continuous motion. If a pose and the one displayed
+   * before have different segments, do not blend them: the avatar has teleported, the client has
+   * reconnected, or poses arrived after the extrapolation had ended. */
   segment: number;
 }
 
@@ -518,7 +518,7 @@ export interface Recording {
   readonly firstTimeS: number;
   /** Server time of the newest recorded pose; NaN if the recording is empty. */
   readonly lastTimeS: number;
-  /** Memory in use. Events count with an estimated size. */
+  /** Memory in use. The size of the events is an estimate. */
   readonly bytes: number;
   /** Same as `World.sampleAll`, but from the recording. Returns 0 outside the recorded time. */
   sampleAll(timeS: number, out: CrowdPose): number;

@@ -57,7 +57,7 @@ struct Config {
   /// True: feet stay fixed on the ground between landing and lifting.
   bool foot_planting = true;
   bool idle_motion = true;       ///< True: standing avatars breathe, sway and shift their weight.
-  bool stride_variation = true;  ///< True: equal steps vary slightly, as those of people do.
+  bool stride_variation = true;  ///< True: equal steps vary slightly, like the steps of people.
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
   bool allow_insecure = false;
   /// True: when a client joins a world that the file does not name, the server creates it.

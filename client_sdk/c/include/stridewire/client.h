@@ -696,7 +696,7 @@ stridewire_status stridewire_client_server_time(stridewire_client* client, doubl
 /// poses then belong to another segment.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
 
-/// How the display follows the connection. Times are 0 before the first pose.
+/// Describes how the render time adapts to the connection. Times are 0 before the first pose.
 typedef struct stridewire_playout {
   double delay_s;            ///< Delay of the render time behind the server time.
   double target_delay_s;     ///< The delay that `delay_s` approaches.
@@ -705,14 +705,14 @@ typedef struct stridewire_playout {
   double worst_jitter_s;     ///< Largest lateness of the last 4 s.
   double newest_age_s;       ///< Server time that has passed since the newest pose message.
   uint64_t displayed_poses;  ///< Number of sampled poses.
-  /// Number of sampled poses after the newest pose, whose motion continued.
+  /// Number of poses that were sampled after the newest pose, while the motion still continued.
   uint64_t extrapolated_poses;
-  /// Number of sampled poses after the newest pose, whose motion had stopped.
+  /// Number of poses that were sampled after the newest pose, when the motion had stopped.
   uint64_t held_poses;
   uint64_t jumps;  ///< Jumps of the render time within a session.
 } stridewire_playout;
 
-/// Gets the state of the display.
+/// Gets the state of the playout. Fields are described at stridewire_playout.
 stridewire_status stridewire_client_get_playout(stridewire_client* client,
                                                 stridewire_playout* playout);
 
@@ -747,10 +747,9 @@ typedef struct stridewire_pose {
   /// all others are relative to the parent joint. May be NULL if `joint_capacity` is 0.
   float* rotations_xyzw;
   size_t joint_capacity;  ///< Set by the caller: number of joints that `rotations_xyzw` can hold.
-  /// Number of the continuous motion to which the pose belongs. Sampled poses have it as well. If
-  /// it differs from that of the pose that was displayed before, the avatar has teleported, the
-  /// client has reconnected, or poses arrived after the extrapolation had ended: the application
-  /// must not blend the two poses.
+  /// Poses with equal segments belong to one continuous motion. If a pose and the one displayed
+  /// before have different segments, the application must not blend them: the avatar has
+  /// teleported, the client has reconnected, or poses arrived after the extrapolation had ended.
   uint32_t segment;
 } stridewire_pose;
 

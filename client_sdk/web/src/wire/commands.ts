@@ -6,8 +6,8 @@ import {Malformed} from './malformed';
 import type {Draft} from './write';
 
 /**
- * Converts arguments of the public interface to messages where they differ. writeMessage checks the
- * types of values and the WebAssembly module their ranges.
+ * Functions that make messages from the arguments of the public interface. writeMessage checks the
+ * types of the values, and the WebAssembly module checks their ranges.
  */
 
 /** Checks that an argument is a list, and converts its entries. */
@@ -35,7 +35,7 @@ export function cancelQueue(avatars: readonly number[]): Draft {
   return {type: 'CancelQueue', avatars};
 }
 
-/** The function `nextId` returns an id for a request that has none. */
+/** Calls `nextId` for the id of each request that has none. */
 export function request(items: readonly MovementRequest[], nextId: () => bigint): Draft {
   return {
     type: 'Request',
@@ -93,7 +93,7 @@ export function observe(observation: Observation): ObserveDraft {
   };
 }
 
-/** `beyond` is the detail of the observation. */
+/** `beyond` is the detail of the observation, which applies beyond the rings of the region. */
 export function region(asked: Region, beyond: PoseDetail): RegionEntry {
   if (asked === null || typeof asked !== 'object') {
     throw new Malformed('region: expected an object');

@@ -2,7 +2,7 @@ import type {AvatarState, Terrain, WorldEvent} from '../types';
 import type {AvatarState as AvatarStateMessage, Event, TerrainInfo} from '../../generated/messages';
 import {parameterNames} from './parameters';
 
-/** Conversions of messages to public types that differ from the schema. */
+/** Functions that convert messages to those public types that differ from the schema. */
 
 export function terrainOf(from: TerrainInfo | null): Terrain | null {
   return from && {

@@ -56,7 +56,7 @@ function readTable(view: DataView, at: number, info: TableInfo): unknown {
   return table;
 }
 
-/** Returns false if the value of a field has no meaning. The module does not check it then. */
+/** Returns false if a field has no meaning in this message. The module does not check its value. */
 export function isUsed(info: TableInfo, {only, with: needed, without}: FieldInfo,
                        table: {readonly [name: string]: unknown}): boolean {
   const has = (name: string): boolean => Boolean(table[name]) &&

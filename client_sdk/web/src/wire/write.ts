@@ -58,7 +58,7 @@ function checkFields(info: TableInfo, value: Fields, path: string, index: number
   }
 }
 
-/** Returns the value of a field. A property that is absent has the initial value. */
+/** Returns the value of a field. If the property is absent, returns its default value. */
 function given(field: FieldInfo, fields: Fields): unknown {
   const value = fields[field.name];
   if (value !== undefined || !field.absent) return value;
@@ -178,7 +178,8 @@ function writeFields(b: Builder, info: TableInfo, value: unknown, size: number):
   }
 }
 
-/** Builds what a field refers to. Returns its offset; 0 if it is absent or stored inline. */
+/** Builds the list, text or table to which a field refers. Returns its offset; 0 if it is absent or
+ * stored inline. */
 function buildTarget(b: Builder, field: FieldInfo, value: unknown): number {
   if (field.list) return buildList(b, field, isList(value) ? value : parameterList(value as never));
   if (field.type === 'string') {
@@ -227,7 +228,7 @@ function buildTable(b: Builder, info: TableInfo, m: Fields): number {
     } else if (field.table !== undefined && tables[field.table]!.struct && !field.list) {
       b.addFieldStruct(slot, writeStruct(b, tables[field.table]!, value), 0);
     } else if (field.initial !== undefined && Number(stored(value, field)) !== field.initial) {
-      // An absent number has the value `initial`; if that is null, every number is stored.
+      // Readers use `initial` for an absent number. If `initial` is null, every number is stored.
       b.prep(field.layout[1], 0);
       writeScalar(b, value, field);
       b.slot(slot);

@@ -129,7 +129,7 @@ struct AvatarOptions {
   /// weight. Their feet do not move. If false, or if feet are not planted, avatars stand still in
   /// the last pose of their last movement.
   bool idle_motion = true;
-  /// True: the duration and the pose of steps vary slightly, as those of people do. Steps meet
+  /// True: the duration and the pose of steps vary slightly, like the steps of people. Steps meet
   /// their parameters and footprints as accurately as without variation. Steps with `exact_only` do
   /// not vary. The default is false, because each avatar needs a different `seed`. The server and
   /// `synthesize` set both.
