@@ -32,8 +32,8 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
       correction_.state = Correction::State::kNone;
       if (displayed_s_ < this->stamp(0).time_s) displayed_s_ = kNever;
     } else if (displayed_s_ > newest.time_s && correction_.state != Correction::State::kPending) {
-      // An extrapolated pose was displayed after the newest pose, and the new pose may differ from
-      // it. Stores the displayed pose, so that the motion continues from there.
+      // The pose that is displayed now was extrapolated beyond the newest received pose. It may
+      // differ from the new pose, so it is stored, and the motion continues from it.
       Vec3 root_m;
       if (Sample(displayed_s_, root_m, displayed_)) {
         correction_.state = Correction::State::kPending;

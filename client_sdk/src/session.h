@@ -25,7 +25,7 @@ class Session : public SessionCommands {
 
   using SessionCommands::SessionCommands;
 
-  // ---- called by the application
+  // ---- The application calls these functions.
 
   /// Starts to connect. `addresses` contains the texts of the servers' addresses, which the caller
   /// connects to by their index. An empty list means one address without a text.
@@ -33,7 +33,7 @@ class Session : public SessionCommands {
   void Close(double now_s);
   stridewire_status Ping(double now_s);
 
-  // ---- called by the network thread. Times never decrease.
+  // ---- The network thread calls these functions, with times that never decrease.
 
   /// Returns whether to start an attempt to connect, with StartConnecting.
   [[nodiscard]] bool ConnectDue(double now_s) const;

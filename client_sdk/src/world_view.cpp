@@ -136,8 +136,9 @@ const WorldView::Track* WorldView::FindTrack(protocol::AvatarId avatar) const {
 }
 
 WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
-  // A message contains the avatars of one shard in ascending order. Tracks of other shards lie
-  // between theirs.
+  // A message contains the avatars of one shard in ascending order, so the search continues after
+  // the previous track. It passes a few tracks that belong to other shards, and then falls back to
+  // a binary search.
   constexpr std::size_t kMaxSteps = 8;
   std::size_t index = next_track_;
   const std::size_t end = std::min(index + kMaxSteps, tracks_.size());

@@ -15,7 +15,8 @@ struct SampleMessage {
   Message message;   ///< A PoseBatch borrows arrays with static lifetime.
 };
 
-/// Rotation codes of the vector `world_info_compact`. The vector `pose_batch_compact` uses them.
+/// Returns the codecs for the compact poses of the vector `pose_batch_compact`. Their parameters
+/// are those in the vector `world_info_compact`.
 [[nodiscard]] const CompactCodecs& SampleCodecs();
 
 /// Returns the messages of all test vectors. The result is always the same.

@@ -228,8 +228,8 @@ namespace Stridewire
         Missing = 0,
         /// <summary>Interpolated between two received poses, or equal to a received pose.</summary>
         Interpolated = 1,
-        /// <summary>A pose that does not move: the last one before a discontinuity, the only one,
-        /// or where EXTRAPOLATED ended.</summary>
+        /// <summary>A pose that does not change with time: the last pose before a discontinuity,
+        /// the only pose, or the pose at the end of the extrapolation.</summary>
         Held = 2,
         /// <summary>A received pose, unchanged.</summary>
         Raw = 3,

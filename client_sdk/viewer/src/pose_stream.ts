@@ -17,7 +17,7 @@ export const streamModes: {readonly [mode in PoseMode]: {label: string; descript
 
 export interface PoseStream {
   readonly mode: PoseMode;
-  /** Joints of quantised poses. Other modes always have all joints. */
+  /** Level of detail of quantised poses. In other modes, poses always contain all joints. */
   readonly detail: PoseDetail;
   /** The page receives, or computes, only the poses of every n-th tick. */
   readonly everyNTicks: (typeof tickIntervals)[number];

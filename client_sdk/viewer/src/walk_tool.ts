@@ -210,7 +210,10 @@ export class WalkTool {
     this.update();
   }
 
-  /** Must be called when the pane closes. Null: the session is lost, so all walks have ended. */
+  /**
+   * Must be called when a pane closes. `pane` is null if the session is lost, so that the walks of
+   * all panes have ended.
+   */
   clear(pane: WorldPane | null): void {
     this.removeWalks((walk) => pane === null || walk.pane === pane);
     if (pane === null || this.press?.pane === pane) this.press = null;

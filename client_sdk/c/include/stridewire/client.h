@@ -721,8 +721,8 @@ typedef enum stridewire_pose_kind {
   STRIDEWIRE_POSE_MISSING = 0,  ///< No pose is known for that time. Other fields are 0.
   /// Interpolated between two received poses, or equal to a received pose.
   STRIDEWIRE_POSE_INTERPOLATED = 1,
-  /// A pose that does not move: the last one before a discontinuity, the only one, or where
-  /// EXTRAPOLATED ended.
+  /// A pose that does not change with time: the last pose before a discontinuity, the only pose, or
+  /// the pose at the end of the extrapolation.
   STRIDEWIRE_POSE_HELD = 2,
   STRIDEWIRE_POSE_RAW = 3,  ///< A received pose, unchanged.
   /// The pose after the newest one has not arrived. The motion continues and slows down, until it

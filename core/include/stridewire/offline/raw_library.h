@@ -48,7 +48,7 @@ struct RawLibrary {
   /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
   Pose stand_pose;
   /// Height differences by which the soles of `stand_pose` deviate from flat soles; 0 if they are
-  /// flat. CompleteLibrary replaces stand poses with tilted soles.
+  /// flat. If the soles are tilted too far, CompleteLibrary replaces the stand pose.
   double stand_tilt_m = 0.0;
   std::vector<RawGroup> groups;
   std::vector<RawLayer> layers;

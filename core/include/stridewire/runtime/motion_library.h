@@ -217,8 +217,8 @@ class MotionLibrary {
   /// Transitions between movements as a table [from][to]. Each index is a group, or the number of
   /// groups for the stand. Empty if the library file contains no transitions.
   [[nodiscard]] std::span<const Transition> transitions() const;
-  /// Returns the transition between two groups. As an index, the number of groups stands for the
-  /// stand. Returns null if the library file contains no transitions.
+  /// Returns the transition between two groups, given by their indices. The index of the stand is
+  /// the number of groups. Returns null if the library file contains no transitions.
   [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const;
   /// Pose of an avatar that has just been spawned, relative to its base frame. The root is at
   /// x = z = 0 with heading 0, and y is above the ground.

@@ -122,8 +122,8 @@ FrameRange FlatFrames(const ExtractedExample& step) {
   return {frame_at(kBegin), frame_at(kEnd) + 1};
 }
 
-// Adds the up direction, in the frames of the standing foot's joints, over the frames in which the
-// foot is flat.
+// Adds the world's up direction to `sole_up` of each joint of the standing foot, once for each
+// frame of the clip in which that foot is flat. The direction is relative to the joint.
 void AddSoles(const Skeleton& skeleton, const ExtractedExample& example,
               std::vector<DVec3>& sole_up) {
   if (!IsStep(example.kind)) return;

@@ -301,8 +301,8 @@ class Planner {
       raise_m = std::clamp(raise_m, std::min(least_m, most_m), most_m);
     }
     // If the blend-in ends before the release, the foot reaches its new height while its heel is
-    // still down. The foot is then lowered only by half of the correction, or by kMaxSinkM less
-    // than the correction if that is more.
+    // still down. The foot is then lowered by only a part of the correction: half of it, or all but
+    // kMaxSinkM of it, whichever is more.
     if (raise_m < 0.0 && settled == 1.0) raise_m = std::min(0.5 * raise_m, raise_m + kMaxSinkM);
     return settled_m + raise_m;
   }

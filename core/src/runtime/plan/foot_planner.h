@@ -31,7 +31,7 @@ struct LandingTarget {
 /// The pose that a movement blends from.
 struct BlendSource {
   ConstPoseSpan before;  ///< Blended pose with difference pose, without planting.
-  /// The pose kBlendStepS before `before`, if the velocity is kept.
+  /// The pose that precedes `before` by kBlendStepS (in seconds), if the velocity is kept.
   std::optional<ConstPoseSpan> earlier;
 };
 
