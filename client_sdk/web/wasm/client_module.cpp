@@ -407,7 +407,7 @@ void OnLost(Client* client, stridewire_status status, std::size_t bytes, double 
 STRIDEWIRE_EXPORT(advance) void Advance(Client* client, double now_s) {
   client->session.AdvanceTime(now_s);
 }
-/// Moves the frames to send to Client::output and returns their size in bytes. results: 0 the
+/// Moves the pending frames into Client::output and returns their size in bytes. results: 0 the
 /// address of the frames.
 STRIDEWIRE_EXPORT(take_output) std::size_t TakeOutput(Client* client) {
   if (!client->session.TakeOutput(client->output)) return 0;

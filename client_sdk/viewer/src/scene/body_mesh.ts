@@ -107,7 +107,7 @@ function reduceRings(rings: readonly Ring[]): Ring[] {
   });
 }
 
-/** Two axes perpendicular to `along`. The first is as close to `side` as possible. */
+/** Returns two axes perpendicular to `along`. The first is as close to `side` as possible. */
 function perpendicularAxes(along: Vec, side: Vec): [Vec, Vec] {
   const dot = along[0] * side[0] + along[1] * side[1] + along[2] * side[2];
   const u = normalised(add(side, along, -dot), Math.abs(along[1]) < 0.9 ? [0, 1, 0] : [1, 0, 0]);

@@ -18,8 +18,9 @@ struct PlantRecord {
   Foot foot = Foot::kLeft;
   double from_s = 0.0;
   double to_s = 0.0;
-  DVec3 anchor_m = DVec3(0.0);  ///< Target of the ball. Without planting, its first position.
-  double drift_m = 0.0;         ///< Largest horizontal distance of the ball from the anchor.
+  /// Target of the ball. Without planting, this is the position of the ball at `from_s`.
+  DVec3 anchor_m = DVec3(0.0);
+  double drift_m = 0.0;  ///< Largest horizontal distance of the ball from the anchor.
 };
 
 /// Describes one played movement. Times are seconds since the start of the choreography.

@@ -65,7 +65,7 @@ struct Parameter {
   double max = 0.0;  ///< Maximum over the examples.
   /// Value that is subtracted before the linear part is evaluated (Section 3: rank deficiency).
   double centre = 0.0;
-  double scale = 1.0;  ///< Values are divided by it before distances are computed; > 0.
+  double scale = 1.0;  ///< Divisor of the values when distances are computed; > 0.
 };
 
 /// Layout of a grid row, which stores the pose of one example at one grid point as floats:

@@ -37,8 +37,8 @@ bool IsHeight(ParameterName name) {
 }
 
 // Returns the range of a parameter in a pool. If there are enough examples, the lowest and the
-// highest value are ignored. The range of a height parameter always includes 0 and every example.
-// A pool in which one example climbs, or all examples climb by the same height, is then not level.
+// highest value are ignored. The range of a height parameter always includes 0 and every example,
+// so that it is not 0 if only one example climbs, or if all climb by the same height.
 double Spread(const Pool& pool, std::size_t parameter) {
   std::vector<double> values;
   for (const RawExample& example : pool.examples) values.push_back(example.parameters[parameter]);

@@ -63,8 +63,8 @@ std::vector<Swing> FindSwings(const FootContacts& contacts) {
   return swings;
 }
 
-// Returns half the median duration of double support. Uses walking swings whose supports are
-// complete.
+// Returns half the median duration of double support, in frames. Ignores double supports that the
+// recording cuts off, and those that are so long that the figure stands.
 double UsualHalfSupport(const std::vector<Swing>& swings, int frame_count, double fps,
                         double standing_max_s) {
   std::vector<double> halves;

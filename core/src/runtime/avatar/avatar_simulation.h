@@ -37,9 +37,10 @@ struct AvatarChange {
   bool is_left_at_end = false;
   /// True if the new movement began during the swing of the previous one.
   bool is_redirected = false;
-  /// Argument of AvatarBody::CaptureBlendSource for the previous movement.
+  /// `keeps_speed` of the call of AvatarBody::CaptureBlendSource for the previous movement.
   bool left_keeps_speed = false;
-  bool begun_keeps_speed = false;  ///< Argument of AvatarBody::BlendIn for the new movement.
+  /// `keeps_speed` of the call of AvatarBody::BlendIn for the new movement.
+  bool begun_keeps_speed = false;
   double left_s = 0.0;  ///< Time within the previous movement at which the avatar left it.
 
   bool operator==(const AvatarChange&) const = default;

@@ -414,9 +414,9 @@ class Planner {
     return std::min(push_m, kMaxPushM);
   }
 
-  // Returns the shift of the root by the end of a step: half of the distance by which the moving
-  // foot lands elsewhere than in the blend, relative to the supporting foot. The root follows the
-  // supporting foot. Without the shift, the body would lean towards that foot.
+  // Returns the shift that keeps the root between both feet at the end of a step. The root follows
+  // the supporting foot, so it would be too close to that foot if the moving foot lands at another
+  // place than in the blend. The shift is half of the distance between these places.
   DVec3 ShiftToCentre(Foot moving) const {
     const FootPlan& plan = movement_.feet;
     const Foot fixed = OtherFoot(moving);

@@ -159,7 +159,8 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
     SoaQuat q = LoadQuats(blend.row + 4 * j, left);
     const Mask is_small = Dot(q, q) < Float(kSmallestNorm * kSmallestNorm);
     is_short = is_short || (is_small && Mask{hn::FirstN(d, left)});
-    // Lengths multiply, so a single normalization at the end is enough.
+    // The length of a product of quaternions is the product of their lengths, so it is enough to
+    // normalize the result.
     if (blend.difference != nullptr) {
       const SoaQuat difference = LoadQuats(blend.difference + 4 * j, left);
       q = Multiply(q, SlerpOf(SlerpPartsOf(difference), Float(blend.fraction)));

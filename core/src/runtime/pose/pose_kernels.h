@@ -36,7 +36,8 @@ struct GridTimes {
   /// Copies of the members of Movement that have these names.
   alignas(64) double duration_s[kBlock], start_offset_s[kBlock], ease_out_s[kBlock];
 };
-/// Positions of poses in their grids, and the fractions of their difference poses that remain.
+/// Values that depend only on the times of the poses: weights of grid points, and the remaining
+/// fractions of turns and difference poses.
 struct GridSamples {
   alignas(64) std::int32_t first_point[kBlock];  ///< First of the four points to interpolate
   /// Weights of these points; 0 beyond the last point

@@ -157,7 +157,8 @@ bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
     float* to = rotations + lane;
     for (std::size_t joint = 0; joint < blend.joint_count; ++joint) {
       SoaQuat q = GatherQuats(RowAddress{blend.rows + lane, 4 * joint});
-      // Lengths multiply, so a single normalization at the end is enough.
+      // The length of a product of quaternions is the product of their lengths, so it is enough to
+      // normalize the result.
       if (state.is_any) q = AddDifference(q, state, blend, joint, lane);
       if (joint > 0) {
         make_unit(last, to);
