@@ -8,8 +8,8 @@
 #include "message_list.h"
 #include "stridewire/protocol/compact_codec.h"
 
-/// Rules between fields, which the schema's attributes cannot express. The generated checks of the
-/// single fields run first, and these only if they hold.
+/// Rules between fields, which the schema's attributes cannot express. These checks run only if the
+/// generated checks of all single fields have succeeded.
 namespace stridewire::protocol {
 namespace {
 
@@ -35,7 +35,7 @@ void CheckRings(Findings& found, const FieldPath& at, const Observe& m) {
              "levels of detail require mode 1 (quantised)", At(at, "ring_details"));
 }
 
-/// Checks that a message with one flag per avatar has that many.
+/// Checks that a list has one entry per avatar.
 void CheckOnePerAvatar(Findings& found, const FieldPath& at, std::size_t count,
                        std::size_t avatars) {
   found.That(count == avatars, at, count, "expected one entry per avatar",
@@ -128,7 +128,7 @@ void CheckMeaning(Findings& found, const FieldPath& at, const WorldInfo& m) {
   if (m.reduced_joints.empty()) return;
   std::vector<std::int16_t> parents;
   for (const JointInfo& joint : m.skeleton.joints) parents.push_back(joint.parent);
-  // Reduced joints are allowed only if there are rotation codes.
+  // Reduced joints are allowed only with quantizations. Without parents, CheckReducedJoints fails.
   if (m.rotation_quantizations.empty()) parents.clear();
   if (const Status status = CheckReducedJoints(m.reduced_joints, parents); !status) {
     found.Wrong(status.error().code, status.error().text, At(at, "reduced_joints"),

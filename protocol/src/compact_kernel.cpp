@@ -136,8 +136,8 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
       }
       if (joint.is_omitted) continue;
       if (joint.parent >= 0) {
-        // Computes q = e q with e = (ex, ey, ez, 1), a rotation by one or two thousandths of a
-        // radian.
+        // Computes q = e q, where e = (ex, ey, ez, 1) is the error of the parent: a rotation by one
+        // or two thousandths of a radian.
         const float* error =
             work.errors + static_cast<std::size_t>(joint.parent) * 3 * kBlock + lane;
         const V ex = hn::LoadU(d, error);
@@ -147,8 +147,7 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         q.x = hn::Add(p.x, hn::Sub(hn::Add(hn::Mul(ex, p.w), hn::Mul(ey, p.z)), hn::Mul(ez, p.y)));
         q.y = hn::Add(p.y, hn::Sub(hn::Add(hn::Mul(ey, p.w), hn::Mul(ez, p.x)), hn::Mul(ex, p.z)));
         q.z = hn::Add(p.z, hn::Sub(hn::Add(hn::Mul(ez, p.w), hn::Mul(ex, p.y)), hn::Mul(ey, p.x)));
-        // Joints without "smallest three" do not encode w, and two digits of its precision are
-        // enough.
+        // Other joints do not encode w. They need only an approximate w, so it is not changed.
         if (joint.smallest_three_bits > 0 || joint.has_reference) {
           q.w = hn::Sub(p.w, Sum3(hn::Mul(ex, p.x), hn::Mul(ey, p.y), hn::Mul(ez, p.z)));
         }

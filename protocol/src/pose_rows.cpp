@@ -73,7 +73,7 @@ void PoseRows::AddEncoded(std::uint8_t flags, bool is_uncompressed,
 
 std::span<std::byte> PoseRows::Room(std::size_t begin, std::size_t length) {
   if (bytes_.size() < begin + length) {
-    // Grow by an eighth only, because the poses of a crowd take megabytes.
+    // Grows only by an eighth, because the poses of a crowd take megabytes.
     const std::size_t room = std::max(begin + length, bytes_.size() + bytes_.size() / 8);
     bytes_.reserve(room);
     bytes_.resize(room);
@@ -90,8 +90,8 @@ void PoseRows::SkipTo(std::size_t row) {
 
 namespace {
 
-// Copies consecutive rows in one go. The processor prefetches within a run of rows, but not from
-// one run to the next, so this function does.
+// Copies each run of consecutive rows at once. The processor prefetches data within a run, but not
+// of the next runs, so this function prefetches them.
 void AppendPoses(const PoseRows& rows, std::span<const std::uint32_t> picked,
                  std::vector<std::byte>& frame) {
   constexpr std::size_t kAhead = 4;

@@ -12,13 +12,13 @@
 
 namespace stridewire::protocol {
 
-/// Copies a message from verified bytes. It checks lengths before it copies, because many
-/// FlatBuffers offsets can refer to the same bytes, so that the decoded message is larger than its
+/// Copies a message from verified bytes. Checks lengths before copying, because many FlatBuffers
+/// offsets can refer to the same bytes, so that a decoded message could be much larger than its
 /// payload.
 class Unpacker : public Findings {
  public:
-  /// Returns the number of entries to read. Without a list it is 0. A list that is too long or not
-  /// aligned is an error and also yields 0.
+  /// Returns the number of entries to read; 0 if there is no list. If the list is too long or not
+  /// aligned, reports an error and returns 0.
   template <typename T>
   std::size_t CountOf(const flatbuffers::Vector<T>* list, const Bounds& bounds,
                       const FieldPath& at) {

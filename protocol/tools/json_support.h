@@ -97,7 +97,7 @@ void FromJson(const Json& json, std::optional<T>& out) {
   if (!json.is_null()) FromJson(json, out.emplace());
 }
 
-/// Reads a member of an object. A member that is not there keeps its value.
+/// Reads a member of an object. If the member is absent, `out` does not change.
 template <typename T>
 void Get(const Json& json, const char* name, T& out) {
   if (const auto member = json.find(name); member != json.end()) FromJson(*member, out);

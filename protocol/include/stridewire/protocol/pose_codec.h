@@ -57,11 +57,11 @@ inline constexpr float kMaxRootM = 131'071.0f;
 
 /// Largest error of a quantised rotation in radians. The error of a component is at most 2.2e-5.
 ///
-/// Each joint is encoded as three little-endian u16. The largest component is dropped (of equal
-/// ones, the one with the lowest index), after negating the quaternion if that component is
-/// negative. Each other component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so
-/// that 0 is exact. Bit 15 of the first and second word are bits 0 and 1 of the dropped index; bit
-/// 15 of the third is 0.
+/// Each joint is encoded as three little-endian u16. The component with the largest magnitude is
+/// dropped; of equal components, the first one. If it is negative, the quaternion is negated
+/// before. Each other component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so that
+/// 0 is exact. Bit 15 of the first and second word are bits 0 and 1 of the dropped index; bit 15 of
+/// the third word is 0.
 inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
 
 /// Largest deviation of a quaternion's length from 1.
@@ -84,9 +84,8 @@ inline constexpr float kUnitTolerance = 1e-3f;
 /// Encodes a full or quantised pose. `out` needs no alignment. Never allocates. On failure the
 /// content of `out` is unspecified. Error codes:
 ///   kShapeMismatch  the size of `out` is not PoseBytes(mode, rotations.size())
-///   kOutOfRange     a number is not finite, the length of a quaternion deviates from 1 by more
-///   than
-///                   kUnitTolerance, or a quantised root exceeds kMaxRootM; `index` is the joint
+///   kOutOfRange     a number is not finite, a length deviates from 1 by more than kUnitTolerance,
+///                   or a quantised root exceeds kMaxRootM; `index` is the joint
 ///   kUnsupported    another mode
 [[nodiscard]] Status EncodePose(PoseMode mode, const Vec3& root_position_m,
                                 std::span<const Quat> rotations, std::span<std::byte> out);
