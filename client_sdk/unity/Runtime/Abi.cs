@@ -165,8 +165,8 @@ namespace Stridewire
         /// <summary>Uses world. Its terrain has changed; see
         /// stridewire_client_get_terrain.</summary>
         Terrain = 11,
-        /// <summary>Uses request_id, and of a walk with a speed also clamped, speed_m_s. The server
-        /// has queued the request.</summary>
+        /// <summary>Uses request_id and, for a walk with a speed, also clamped and speed_m_s. The
+        /// server has queued the request.</summary>
         Accepted = 32,
         /// <summary>Uses request_id, kind, group, requested, applied, extrapolated, clamped. A
         /// movement has started.</summary>

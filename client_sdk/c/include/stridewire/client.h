@@ -479,8 +479,8 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_TERRAIN = 11,
 
   // Events about an avatar. All of them also use world, avatar, tick and time_s.
-  /// Uses request_id, and of a walk with a speed also clamped, speed_m_s. The server has queued the
-  /// request.
+  /// Uses request_id and, for a walk with a speed, also clamped and speed_m_s. The server has
+  /// queued the request.
   STRIDEWIRE_EVENT_ACCEPTED = 32,
   /// Uses request_id, kind, group, requested, applied, extrapolated, clamped. A movement has
   /// started.
