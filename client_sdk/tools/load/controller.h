@@ -23,7 +23,7 @@ struct ControllerCounts {
   /// Number of requests that were rejected, in the Reply or later by an event.
   std::uint64_t requests_rejected = 0;
   std::map<protocol::StatusCode, std::uint64_t> rejected_by_code;
-  /// Delay of the actual behind the planned time of sending a request.
+  /// Delay between the planned and the actual time at which a request is sent.
   LatencyHistogram send_late;
 };
 

@@ -100,7 +100,7 @@ export class TerrainSurface {
     while (t <= maxDistanceM) {
       const above = y + dy * t - this.heightAt(x + dx * t, z + dz * t);
       if (above <= 0) {
-        // Bisect the last step. If it crossed a wall, the result is at the wall's foot or top.
+        // Bisects the last step. If it crossed a wall, the result is at the wall's foot or top.
         for (let i = 0; i < 24; ++i) {
           const middle = (before + t) / 2;
           if (y + dy * middle > this.heightAt(x + dx * middle, z + dz * middle)) before = middle;

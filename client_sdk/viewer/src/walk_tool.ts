@@ -177,7 +177,7 @@ export class WalkTool {
     });
   }
 
-  /** Use the direction of arrival, or the current heading if the goal is very close. */
+  /** Returns the direction of arrival, or the current heading if the goal is very close. */
   private defaultHeading(
     pane: WorldPane, avatar: number, atM: Vec3, waypointsM: readonly Vec3[]): number {
     const location = pane.view.locate(avatar);

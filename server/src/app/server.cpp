@@ -260,7 +260,7 @@ void Server::AddPages() {
     return HttpAnswer{.content_type = "application/json", .body = InfoText()};
   });
   for (const auto& [name, library] : libraries_.All()) {
-    // Publish the file name of a library, but not its folder.
+    // The pages contain the file name of a library, but not its folder.
     library_pages_.Add(name.substr(name.rfind('/') + 1), library);
   }
   http_.SetSlowPage("/libraries", [this](const HttpQuery& query) {
@@ -281,7 +281,7 @@ void Server::AddPages() {
 }
 
 std::string Server::InfoText() const {
-  // Publish the file name of a library, but not its folder.
+  // The page contains the file name of a library, but not its folder.
   const auto library_name = [this](const std::string& world) {
     const auto it = config_.worlds.find(world);
     const bool has_own = it != config_.worlds.end() && !it->second.library.empty();

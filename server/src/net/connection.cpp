@@ -125,7 +125,7 @@ void Connection::OnReceived(const error_code& error, const Transport::Chunk& chu
     return;
   }
   if (is_closing_) {
-    Read();  // Receive and discard further bytes until the peer closes.
+    Read();  // Further bytes are received and discarded until the peer closes.
     return;
   }
   unread_ = chunk.bytes;

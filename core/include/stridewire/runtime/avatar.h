@@ -137,8 +137,8 @@ struct AvatarOptions {
   /// Determines the starting point in the loop of the idle motion, and the variation of steps, so
   /// that avatars of a crowd do not move in unison.
   std::uint64_t seed = 0;
-  /// Ground on which the feet land. Null: level ground at the avatar's height, which requests with
-  /// a height then change.
+  /// Ground on which the feet land. Null: level ground at the avatar's height. A request with a
+  /// height then moves the avatar up or down.
   std::shared_ptr<const Terrain> terrain;
 };
 

@@ -63,7 +63,8 @@ struct Parameter {
   ParameterName name = ParameterName::kStartZ;
   double min = 0.0;  ///< Minimum over the examples.
   double max = 0.0;  ///< Maximum over the examples.
-  /// Value that is subtracted before the linear part is evaluated (Section 3: rank deficiency).
+  /// Mean over the examples, which is subtracted before the linear part of the weights is
+  /// evaluated.
   double centre = 0.0;
   double scale = 1.0;  ///< Divisor of the values when distances are computed; > 0.
 };
@@ -111,8 +112,8 @@ struct GridLayout {
 /// Number of floats in the longest possible grid row.
 inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 
-/// The sources of examples that were generated because the captures lack such movements begin with
-/// this text.
+/// Beginning of MotionGroup::sources of the examples that were generated because the captures lack
+/// such movements.
 inline constexpr std::string_view kCompletedSource = "completed";
 
 /// Maximum time over which a difference pose fades out (T in Section 5 of the paper), in seconds.

@@ -6,7 +6,7 @@
 
 namespace stridewire {
 
-// Returns the distance of two points, ignoring their heights.
+// Returns the distance between two points, ignoring their heights.
 [[nodiscard]] inline double HorizontalDistance(const DVec3& a, const DVec3& b) {
   return std::hypot(a.x - b.x, a.z - b.z);
 }

@@ -94,7 +94,7 @@ struct Refinement {
 /// With the bare rule, the radii near a new site shrink, and sometimes the largest error grows. The
 /// amended rule keeps the condition number below kMaxRefinedCondition and the sum of |w| below
 /// kMaxRefinedWeightSum. It runs the following passes until one reaches max_error_m. If none does,
-/// the pass with the smallest largest error, measured with samples of another seed, is used.
+/// it uses the pass whose largest error, measured with samples of another seed, is smallest.
 ///
 /// 1. The radii of the examples are constant. Sites that do not reduce the error are rejected.
 /// 2. Radii shrink, and every site is added. Finally, the sites added after the best state are

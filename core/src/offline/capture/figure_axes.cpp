@@ -21,8 +21,8 @@ constexpr double kSnapCos = 0.906;  // Directions within 25 degrees of an axis s
 constexpr double kRestCos = 0.8;
 constexpr double kStraightShare = 0.9;
 // Limits on the cosine of the angle between an axis and the mean direction from the feet to the
-// hips. From kMotionCos, the figure stands along this axis. From kWeakMotionCos, the feet are
-// mostly below the hips along this axis, as in crawling.
+// hips. If it is at least kMotionCos, the figure stands along this axis. If it is at least
+// kWeakMotionCos, the feet are mostly below the hips along this axis, as in crawling.
 constexpr double kMotionCos = 0.85;
 constexpr double kWeakMotionCos = 0.35;
 // The following distances are in leg lengths.
@@ -248,8 +248,8 @@ class AxesFinder {
     }
   }
 
-  // Corrects the up axis of a figure that lies in the whole motion, in which the direction from the
-  // feet to the hips is not up. Such a figure is recognized by its positions: along the assumed
+  // Corrects the up axis of a figure that lies during the whole motion, so that the direction from
+  // the feet to the hips is not up. Such a figure is recognized by its positions: along the assumed
   // axis the feet are far from zero, and along the usual up axis the lowest joints are near zero.
   void AvoidLying() {
     const DVec3 up = AxisVector(axes_.up);

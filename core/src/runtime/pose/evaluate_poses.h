@@ -55,7 +55,7 @@ void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Mov
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out);
 
-/// Velocities are measured between poses that are this far apart.
+/// Time in seconds between the two poses from which a velocity is measured.
 inline constexpr double kBlendStepS = 0.004;
 
 /// Sets the velocity of a movement's difference pose. `before` is the previous movement's pose at

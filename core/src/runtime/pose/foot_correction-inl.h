@@ -161,7 +161,8 @@ STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timi
       EaseOut(since_s / Max(Constant<Number>(kRootShiftS), residual.approach_over_s));
   const Number rise = EaseOut(since_s / Max(Constant<Number>(kRootShiftS),
                                             Constant<Number>(kRootRisePart) * timing.duration_s));
-  // The difference pose moves the root by `blended` of the approach.
+  // The difference pose already contributes the fraction `blended` of the approach, so only the
+  // difference from the wanted fraction `part` is added.
   const Number faded = timing.OfEaseOut(since_s);
   const Number blended = EaseOut(faded);
   const Number blended_s = timing.ease_out_s * EaseOutSlope(faded);

@@ -432,7 +432,7 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   Float headings[2];
   Float flatnesses[2];
   EvaluateLegs(rig, rotations, root_rotation, legs, joints);
-  // Share of what planting changes that has faded in (FootPlan::plant_fade_s).
+  // Fraction of the changes by planting that has faded in (FootPlan::plant_fade_s).
   const Mask is_settling = common.plant_fade_s > Float(0.0f);
   const Float planted =
       Select(is_settling,

@@ -9,7 +9,7 @@
 // NOLINTNEXTLINE(readability-identifier-naming): Highway's
 #define HWY_TARGET_INCLUDE "runtime/pose/pose_kernels.cpp"
 #include "hwy/foreach_target.h"
-// These must follow foreach_target.h, which includes this file once per instruction set.
+// These headers must follow foreach_target.h, which includes this file once per instruction set.
 #include "hwy/highway.h"
 #include "runtime/pose/foot_plant-inl.h"
 #include "runtime/pose/simd_math-inl.h"
@@ -28,9 +28,9 @@ HWY_INLINE void StayInRegister([[maybe_unused]] hn::Vec<FloatTag>& x) {
 #endif
 }
 
-// Sums `Vectors` vectors, starting at offset `at`, of the rows of `Rows` movements at the same
-// time. The sums are independent, so their additions overlap. Each value that is read from the
-// library is used for all movements.
+// Computes a part of the blended rows of `Rows` movements: the `Vectors` SIMD vectors of each row
+// that start at offset `at`. The sums are independent, so their additions overlap. Each value that
+// is read from the library is used for all movements.
 template <std::size_t Rows, std::size_t Vectors>
 HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const* weights,
                            std::size_t count, std::size_t row_floats, float* const* rows,

@@ -15,8 +15,8 @@ namespace stridewire::protocol {
 /// or thread. Not thread-safe.
 ///
 /// `Encode` appends header and payload to `frame`, so that one write can send several frames. It
-/// fails with the errors of Check (check.h), and with kLimitExceeded if the payload exceeds the cap
-/// of its message type. On failure `frame` is unchanged.
+/// fails with the errors of Check (check.h), and with kLimitExceeded if the payload exceeds the
+/// limit of its message type. On failure `frame` is unchanged.
 class Encoder {
  public:
   explicit Encoder(const FrameLimits& limits = {});
