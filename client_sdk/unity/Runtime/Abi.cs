@@ -109,7 +109,8 @@ namespace Stridewire
     {
         /// <summary>The server sends float32 values, without loss.</summary>
         Full = 0,
-        /// <summary>Compressed. The error of each joint and end site is at most 1 mm.</summary>
+        /// <summary>The server sends compressed poses. The error of each joint and end site is at
+        /// most 1 mm.</summary>
         Quantised = 1,
         /// <summary>The server sends movements, about 150 bytes per step, and the client evaluates
         /// the poses. They equal those of STRIDEWIRE_FULL bit for bit. The client fetches the
@@ -184,7 +185,7 @@ namespace Stridewire
         /// reach), missed_m, missed_rad and nearest_*. At the end of a walk, also uses
         /// speed_m_s.</summary>
         Rejected = 37,
-        /// <summary>base</summary>
+        /// <summary>Uses base. The avatar was spawned.</summary>
         Spawned = 38,
         Removed = 39,
         /// <summary>The avatar has entered the observed region.</summary>

@@ -307,8 +307,8 @@ stridewire_status stridewire_client_cancel(stridewire_client* client, stridewire
 typedef struct stridewire_height_field {
   double origin_m[2];      ///< World x and z of the first sample.
   double cell_m;           ///< Distance between neighbouring samples, 0.01 to 1000.
-  uint32_t columns;        ///< Samples along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
-  uint32_t rows;           ///< Samples along z, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
+  uint32_t columns;        ///< Number of samples along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
+  uint32_t rows;           ///< Number of samples along z, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
   const float* heights_m;  ///< Heights of columns * rows samples, row by row along x.
 } stridewire_height_field;
 
@@ -371,7 +371,7 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
 /// Form in which the server sends poses.
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,  ///< The server sends float32 values, without loss.
-  /// Compressed. The error of each joint and end site is at most 1 mm.
+  /// The server sends compressed poses. The error of each joint and end site is at most 1 mm.
   STRIDEWIRE_QUANTISED = 1,
   /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
   /// equal those of STRIDEWIRE_FULL bit for bit. The client fetches the world's library first,
@@ -422,7 +422,7 @@ typedef struct stridewire_observation {
   const uint32_t* avatars;  ///< Ids of the avatars to observe. NULL: all avatars.
   /// Number of ids: 0 if `avatars` is NULL, at most STRIDEWIRE_MAX_ITEMS.
   size_t avatar_count;
-  /// Detail of the poses. Other values than 0 require STRIDEWIRE_QUANTISED.
+  /// Detail of the poses. Values other than 0 require STRIDEWIRE_QUANTISED.
   stridewire_pose_detail detail;
   /// Observes the avatars inside this region. NULL: no region. `avatars` must then be NULL. The
   /// events ENTERED and LEFT report changes. A region must be the only observation of its world
@@ -495,7 +495,7 @@ typedef enum stridewire_event_type {
   /// (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point in reach), missed_m,
   /// missed_rad and nearest_*. At the end of a walk, also uses speed_m_s.
   STRIDEWIRE_EVENT_REJECTED = 37,
-  STRIDEWIRE_EVENT_SPAWNED = 38,  ///< base
+  STRIDEWIRE_EVENT_SPAWNED = 38,  ///< Uses base. The avatar was spawned.
   STRIDEWIRE_EVENT_REMOVED = 39,
   STRIDEWIRE_EVENT_ENTERED = 40,  ///< The avatar has entered the observed region.
   STRIDEWIRE_EVENT_LEFT = 41      ///< The avatar has left the observed region or the world.
@@ -649,7 +649,7 @@ typedef struct stridewire_layer_name {
   char name[STRIDEWIRE_MAX_NAME_BYTES + 1];
 } stridewire_layer_name;
 
-/// Lists the layers of a world's library. Writes up to `capacity` names; `count` receives the
+/// Lists the layers of a world's library. Writes up to `capacity` names, and `count` receives the
 /// total, at most 64. `names` may be NULL if `capacity` is 0. Returns BUFFER_TOO_SMALL if the total
 /// exceeds `capacity`, and NOT_READY before the event WORLD_JOINED.
 stridewire_status stridewire_client_list_layers(stridewire_client* client, stridewire_world world,
@@ -661,7 +661,7 @@ typedef struct stridewire_terrain {
   double origin_m[2];  ///< World x and z of the first height sample.
   double cell_m;       ///< Distance between neighbouring samples.
   uint32_t columns;    ///< Number of samples along x. 0: the terrain has no height field.
-  uint32_t rows;       ///< Samples along z.
+  uint32_t rows;       ///< Number of samples along z.
   uint32_t box_count;
 } stridewire_terrain;
 
@@ -712,7 +712,7 @@ typedef struct stridewire_playout {
   uint64_t jumps;  ///< Jumps of the render time within a session.
 } stridewire_playout;
 
-/// Gets the state of the playout. Fields are described at stridewire_playout.
+/// Gets the delays of the render time and the counts of sampled poses.
 stridewire_status stridewire_client_get_playout(stridewire_client* client,
                                                 stridewire_playout* playout);
 

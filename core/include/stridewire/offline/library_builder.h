@@ -68,9 +68,9 @@ struct GroupSelection {
 /// generic-time grid, aligns quaternion hemispheres, selects or averages examples as configured,
 /// and solves for the interpolation weights.
 struct LibraryBuilder {
-  /// Returns a builder configured to keep a representative selection of captured movements: it
-  /// averages movements within 5 cm of each other, drops outliers beyond five deviations and
-  /// movements that the rest reproduces within 2.5 cm, and smooths what remains.
+  /// Returns a builder configured to keep a representative selection of captured movements. It
+  /// averages movements within 5 cm of each other. It drops outliers beyond five deviations, and
+  /// movements that the others reproduce within 2.5 cm. Finally, it smooths the kept movements.
   [[nodiscard]] static LibraryBuilder Selecting();
 
   /// Approximate number of grid cells per second of mean duration. Intervals in which an example

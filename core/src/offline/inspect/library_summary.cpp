@@ -68,9 +68,9 @@ class Summarizer {
   LibrarySummary Run() {
     summary_.stand_stride_m =
         std::fabs(FootVector(library_.skeleton(), library_.stand_pose(), Foot::kLeft, 0.0).z);
-    // Groups with more parameters contain the complete movement, whereas straight steps are stored
-    // without their turn. These groups are therefore read first, and copies in other groups are
-    // ignored.
+    // A step may be stored in two groups: complete among the general steps, and without its turn
+    // among the straight steps. Groups with more parameters are therefore read first, and copies in
+    // later groups are ignored.
     std::vector<std::size_t> order(library_.groups().size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {

@@ -176,7 +176,7 @@ class BitAllocator {
   void Allocate() {
     while (AddBit()) {
     }
-    // Takes back unnecessary bits.
+    // Removes unnecessary bits.
     for (std::size_t j = joints_.size(); j-- > 0;) {
       for (std::size_t c = 0; c < 3; ++c) {
         while (RemoveBit(j, c)) {
@@ -248,9 +248,8 @@ class BitAllocator {
            static_cast<double>(1 << bits);
   }
 
-  // Returns the maximum error of a quantized rotation in radians. If a component has an error of
-  // half a step, then w, which is computed from the components, has an error of half a step times
-  // |v| / w.
+  // Returns the maximum error of a quantized rotation in radians. If components have errors of half
+  // a step, then w, which is computed from them, has an error of half a step times |v| / w.
   [[nodiscard]] double AngleOf(std::size_t joint, const Bits& bits) const {
     if (joints_[joint].is_unbounded) {
       // The error is largest if all four components are 0.5. Then each of the three encoded

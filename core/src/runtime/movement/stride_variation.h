@@ -17,8 +17,8 @@ class StrideVariation {
 
   /// Returns the factor for the playback speed of the step. Half of its deviation is random for
   /// this step, and the other half is that of the previous step, because successive strides of
-  /// people are correlated (Hausdorff et al. 1995). Stride times, over two steps, then vary by 1.3
-  /// %, as those of young adults do (Hausdorff et al. 1996; decision 0041).
+  /// people are correlated (Hausdorff et al. 1995). The times of strides, which are two steps, then
+  /// vary by 1.3 %, like those of young adults (Hausdorff et al. 1996; decision 0041).
   [[nodiscard]] double RateFactor() const;
 
   /// Returns a number in [-1, 1) for an example. These numbers form the direction in which the

@@ -136,9 +136,9 @@ HWY_INLINE Float CosNearZero(Float square) {  // |x| <= pi / 2
   return p * square + Float(1.0f);
 }
 
-// The parts of slerp(1, q, fraction), along the short arc, that do not depend on the fraction. The
-// tangent of a quarter of the angle is m =
-// xyz| / (1 + |w|), and half the angle is 2 atan m. This avoids a division by a small sine.
+// The parts of slerp(1, q, fraction), along the short arc, that do not depend on the fraction. With
+// m = |xyz| / (1 + |w|), the tangent of a quarter of the angle, half the angle is 2 atan m. This
+// avoids a division by a small sine.
 struct SlerpParts {
   SoaVec3 half;  // Rotation vector of half the angle.
   Float square;  // |half|^2
