@@ -91,8 +91,8 @@ struct BvhReadOptions {
 ///   Otherwise its horizontal distance from the ankle is 2/3 of that of the End Site, and it is as
 ///   high as the End Site when the sole is flat.
 /// - If the figure stands in the rest pose, this pose determines the up axis. If it does not, or if
-///   it clearly stands and moves along another axis in the motion, the up axis is the mean direction
-///   from ankles to hips over the motion. A rest pose that stands is turned to face +Z.
+///   it clearly stands and moves along another axis in the motion, the up axis is the mean
+///   direction from ankles to hips over the motion. A rest pose that stands is turned to face +Z.
 ///   Otherwise the frames of the joints keep their axes, except for the change of the up axis.
 /// - The unit is the common unit (m, ft, dm, 1/0.45 inch, inch, cm or mm) for which the legs are
 ///   0.68 to 1.0 m long. If no unit fits, the motion is scaled so that standing hips are at 0.95 m.
