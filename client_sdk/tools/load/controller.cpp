@@ -152,7 +152,7 @@ void Controller::Remove(const std::vector<protocol::AvatarId>& avatars, Command 
 }
 
 void Controller::OnSpawnReply(const protocol::Reply& reply, const Pending& pending) {
-  // An aborted run or a lost connection can leave avatars behind.
+  // Avatars of an aborted run or of a lost connection may still exist.
   std::vector<protocol::AvatarId> existing;
   std::size_t refused = 0;
   std::string why;

@@ -53,7 +53,7 @@ class TickWindow {
     const std::uint64_t first = first_.load();
     return first != 0 && tick >= first && tick <= last_.load();
   }
-  /// Returns how many ticks from `from` to `to`, both inclusive, are in the window.
+  /// Returns the number of ticks from `from` to `to`, both inclusive, that are in the window.
   [[nodiscard]] std::uint64_t CountBetween(std::uint64_t from, std::uint64_t to) const {
     const std::uint64_t first = first_.load();
     if (first == 0) return 0;

@@ -50,9 +50,8 @@ struct Recording {
   /// Runs of missing frames; at most kMaxGaps of them are listed.
   std::vector<Gap> gaps;
   std::uint64_t discontinuities = 0;
-  /// Restarts of the server. The ticks of the new server are unrelated to those before. The gap
-  /// therefore gets a number of frames that corresponds to the time without poses. These frames
-  /// repeat the last pose.
+  /// Restarts of the server. A restarted server counts its ticks from 0, so the length of a gap is
+  /// measured by the local clock. The frames of the gap repeat the last pose.
   std::vector<Restart> restarts;
   std::uint64_t bytes_received = 0;
   std::string cut_short;  ///< Why the recording is shorter than requested. Empty: it is complete.

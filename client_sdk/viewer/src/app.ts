@@ -41,8 +41,8 @@ import type {AvatarSelection, WorldPane} from './world_pane.js';
 import {WorldPanes} from './world_panes.js';
 
 /**
- * Interval at which panels read the states of avatars, and the page reads the layout of its
- * elements.
+ * Interval at which the panels request the states of avatars, and at which the page measures the
+ * layout of its elements.
  */
 const panelUpdateIntervalMs = 250;
 /** Interval at which the list of worlds is requested from the server. */

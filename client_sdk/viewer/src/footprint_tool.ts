@@ -11,7 +11,7 @@ import type {AvatarSelection, WorldPane} from './world_pane.js';
 export interface FootprintHost {
   readonly panes: readonly WorldPane[];
   selection(): AvatarSelection | null;
-  /** Returns whether the page is live, so that it does not show the recording. */
+  /** Returns whether the page shows the live view instead of the recording. */
   live(): boolean;
   /** Returns the last state of the selected avatar that the server reported. */
   inspected(): Inspector['state'];

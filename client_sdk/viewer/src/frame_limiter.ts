@@ -1,5 +1,5 @@
 /**
- * Limits the frame rate. Its mean is the requested rate, whatever the display's refresh rate is.
+ * Limits the frame rate. The mean rate is the requested rate at any refresh rate of the display.
  */
 export class FrameLimiter {
   /** Mean time between two drawn frames in milliseconds; 0 without a limit. */

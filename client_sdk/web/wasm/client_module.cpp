@@ -58,7 +58,7 @@ constexpr std::size_t kTextAt = 14;
 constexpr std::size_t kTextBytes = 15;
 std::array<double, 32> results;
 std::string text;
-// Memory for arguments. Its unit is 8 bytes, because frames must be aligned.
+// Memory for arguments. Its elements have 8 bytes, because frames must be aligned to 8 bytes.
 std::vector<std::uint64_t> input_words;
 
 void SetText(std::string_view value) {
@@ -280,8 +280,8 @@ STRIDEWIRE_EXPORT(describe_status) void DescribeStatus(stridewire_status status,
 
 // ---- a client
 
-/// Creates a client. `input` contains 11 numbers, in the order in which they are read here, and
-/// then the client's name and token. Returns null and sets the text if one of the texts is invalid.
+/// Creates a client. `input` contains 11 numbers, in the order in which this function reads them,
+/// and then the client's name and token. Returns null and sets the text if a text is invalid.
 STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t token_bytes) {
   std::array<double, 11> numbers;
   const auto input = Input(sizeof numbers + name_bytes + token_bytes);

@@ -25,7 +25,7 @@ using Json = nlohmann::ordered_json;
 // Maximum absolute value of a parameter, in metres or radians. Larger values are probably typos.
 constexpr double kMaxParameter = 20.0;
 
-// Rounds to 0.01 mm to save bytes.
+// Rounds to 0.01 mm, so that the JSON text is shorter.
 double Round(double value) { return std::round(value * 1e5) / 1e5; }
 
 template <typename Values>

@@ -167,8 +167,8 @@ void Shard::Publish() {
     }
     PublishPoses(*world);
   }
-  // The outbox of this shard is posted as well instead of being handled here, so that the shard
-  // sends the messages after the tick and ticks do not become longer.
+  // The outbox of this shard is posted as well, so that the shard handles it after the tick. The
+  // tick would otherwise take longer.
   for (auto& [shard, outbox] : std::exchange(outboxes_, {})) {
     shards_.at(static_cast<std::size_t>(shard))->Post(std::move(outbox));
   }

@@ -14,8 +14,8 @@ std::string Where(const std::string& file, const toml::source_region& source,
   return fmt::format("{}:{}: {}", file, static_cast<unsigned>(source.begin.line), key);
 }
 
-// Returns the value of `node` as text for ConfigKey::set, or nullopt if its type is wrong for
-// `key`.
+// Returns the value of `node` as text for ConfigKey::set. Returns nullopt if the type of the value
+// is wrong for `key`.
 std::optional<std::string> ScalarText(const toml::node& node, const ConfigKey& key) {
   if (key.is_list) {
     const toml::array* items = node.as_array();

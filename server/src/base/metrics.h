@@ -47,8 +47,8 @@ class TimeHistogram {
 };
 
 /// Counters of one thread: a shard, or the main thread that accepts connections. Only this thread
-/// writes them. The alignment of two cache lines keeps them away from the data of other threads;
-/// processors prefetch lines in pairs.
+/// writes them. They are aligned to two cache lines, because processors prefetch lines in pairs.
+/// Data of other threads is thus never in these lines.
 struct alignas(128) ThreadMetrics {
   Count avatars;
   Count regions;  ///< Regions that sessions of this shard observe.

@@ -25,9 +25,10 @@ class TrustedProxies {
   /// Returns the address of the client of a connection from `peer`. `forwarded` is the content of
   /// X-Forwarded-For: addresses separated by commas, to which each proxy appends the address of its
   /// own peer. Returns `peer` if it is not trusted. Otherwise, returns the last address in the list
-  /// that is not trusted. The addresses before it mean nothing, because a client can send a header
-  /// with any addresses. If all are trusted, returns the first one. If an entry that is reached is
-  /// not an address, returns the address after it, or `peer` if it is the last entry.
+  /// that is not trusted. The addresses before it are ignored, because a client can send a header
+  /// with any addresses. If all are trusted, returns the first one. If the search from the end
+  /// reaches an entry that is not an address, returns the address after it, or `peer` if the entry
+  /// is the last one.
   [[nodiscard]] boost::asio::ip::address ClientOf(const boost::asio::ip::address& peer,
                                                   std::string_view forwarded) const;
 

@@ -10,7 +10,7 @@
 namespace stridewire::builtin {
 namespace {
 
-// Minimum height of a swinging foot above level ground: 15 mm, plus what blending loses.
+// Minimum height of a swinging foot above level ground: 15 mm, plus 2 mm that blending may lose.
 constexpr double kClearanceM = 0.017;
 constexpr double kLiftStepM = 0.004;
 constexpr double kMinLiftM = -0.08;

@@ -15,8 +15,9 @@
 #include "offline/capture/foot_shape.h"
 #include "offline/capture/leg_chain.h"
 
-// Conversion from the axes and the unit of a file to ours. Let W be the rotation of the world that
-// turns up to +Y, and B the rotation of the joint frames that makes the resting figure face +Z:
+// Conversion from the axes and the unit of a file to those of base/math.h. Let W be the rotation of
+// the world that turns up to +Y, and B the rotation of the joint frames that makes the resting
+// figure face +Z:
 //
 //   root'    = unit W root        R_root' = W R_root B^-1
 //   offset'  = unit B offset      R_joint' = B R_joint B^-1
@@ -273,8 +274,8 @@ class Reader {
   }
 
   // Some conversions declare 30 Hz for motion that was captured at 120 Hz. This is detected by the
-  // acceleration of the ankles over 50 ms. Its 99th percentile is 17 m/s^2 in the slowest walk of
-  // our captures and 68 in the fastest. Playback at a quarter of the speed reduces that to 1 to 4.
+  // acceleration of the ankles over 50 ms. In correct captures of walks, its 99th percentile was 17
+  // to 68 m/s^2. Playback at a quarter of the speed reduces that to 1 to 4.
   void NoteSlowMotion() {
     const Clip& clip = figure_.clip;
     const int half = std::max(1, static_cast<int>(std::lround(0.025 * clip.fps)));

@@ -10,15 +10,15 @@
 
 namespace stridewire {
 
-/// Rotations from the axes of a file to our axes, in which +Y is up. If the rest pose is standing,
-/// it then faces +Z when all rotations are the identity.
+/// Rotations from the axes of a file to Stridewire's axes, in which +Y is up. If the figure stands
+/// in the rest pose, it faces +Z after the rotation.
 struct FigureAxes {
   BvhAxis up = BvhAxis::kPlusY;            ///< The up axis of the file.
   UpSource up_source = UpSource::kOption;  ///< What determined `up`.
   bool rest_stands = false;                ///< True if the rest pose is standing.
-  /// Rotation from the world axes of the file to ours.
+  /// Rotation from the world axes of the file to those of Stridewire.
   DQuat world_turn = DQuat(1.0, 0.0, 0.0, 0.0);
-  /// Rotation from the axes of the file's joint frames to the axes of ours.
+  /// Rotation from the axes of the file's joint frames to those of the converted joint frames.
   DQuat joint_turn = DQuat(1.0, 0.0, 0.0, 0.0);
 };
 

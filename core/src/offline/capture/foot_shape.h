@@ -5,7 +5,7 @@
 
 namespace stridewire {
 
-/// Sets the joints of `leg`, its ball and its toe tip. `figure` must be in metres and in our axes,
+/// Sets the joints of `leg`, its ball and its toe tip. `figure` must be in metres and have +Y up,
 /// with root positions in its clip. Adds notes to `figure`.
 ///
 /// If there is no toe joint, the ball is placed at two thirds of the foot's length, at the height
