@@ -98,7 +98,7 @@ class Controller final : public Session {
 
   RunState& run_;
   const int world_;
-  LatencyProbes* probes_;  ///< Latency probes. Null: no observer measures latency here.
+  LatencyProbes* probes_;  ///< Latency probes. Null: no observer of this world measures latency.
   protocol::WorldId world_id_ = 0;
   std::map<protocol::Seq, Pending> pending_;
   std::size_t spawned_count_ = 0;

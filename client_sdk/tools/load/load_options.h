@@ -56,7 +56,7 @@ struct LoadOptions {
 
 /// A parsed command line.
 struct LoadCommandLine {
-  std::string text;  ///< Help or version to print instead of a run, or empty.
+  std::string text;  ///< Help text or version to print instead of a run; empty: start a run.
   LoadOptions options;
 };
 

@@ -239,10 +239,10 @@ export class AvatarCommands {
   }
 
   /**
-   * Stops all random walkers of the world if there are any. Otherwise, it starts new ones: the
-   * selected avatar; without a selection, the avatars that this page has spawned; without those, or
-   * if commands go to all avatars, every avatar of the world. If the world is empty, it first
-   * spawns avatars.
+   * If avatars of the world walk at random, stops all of them. Otherwise, lets avatars walk at
+   * random: all avatars of the world if commands go to all avatars, or else the selected avatar.
+   * Without a selection, the avatars that this page has spawned walk, or all avatars if the page
+   * has spawned none. If the world is empty, spawns new avatars.
    */
   toggleRandomWalk(): void {
     const pane = this.host.commandedPane();

@@ -6,7 +6,7 @@ export class FrameLimiter {
   readonly intervalMs: number;
   private dueMs = 0;
 
-  /** `framesPerS` Infinity means no limit. */
+  /** If `framesPerS` is Infinity, the rate is not limited. */
   constructor(framesPerS: number) {
     this.intervalMs = 1000 / framesPerS;
   }

@@ -99,8 +99,8 @@ std::optional<Captures> ReadCaptures(const std::vector<std::string>& paths,
   return captures;
 }
 
-// Reads all files so that they agree on up axis and unit. If files disagree, all files are read
-// again, because this is known only after the first pass. It is rare.
+// Reads all files so that they agree on up axis and unit. If the first pass finds that files
+// disagree, which is rare, reads all files again.
 std::optional<Captures> ReadAgreeingCaptures(const std::vector<std::string>& paths,
                                              const BvhReadOptions& read,
                                              const AssembleOptions& options, Progress& progress) {

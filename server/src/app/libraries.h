@@ -25,7 +25,7 @@ class Libraries {
   /// Returns the compact pose formats of a library, or null if no library has this name.
   [[nodiscard]] std::shared_ptr<const PoseQuantizations> FindQuantizations(
       const std::string& name) const;
-  /// Returns the walking speeds of a library. Unknown if no library has this name.
+  /// Returns the walking speeds of a library, or unknown speeds (0) if no library has this name.
   [[nodiscard]] WalkSpeeds FindWalkSpeeds(const std::string& name) const;
   [[nodiscard]] const std::map<std::string, std::shared_ptr<const MotionLibrary>>& All() const {
     return libraries_;

@@ -13,7 +13,7 @@ export interface StickFigure {
   readonly lines: readonly number[];
   /** [point]: `Region` of the lines that end at this point. */
   readonly regions: Uint8Array;
-  /** Joint indices of the first points. */
+  /** [point]: index of the joint at this point. The extra points come after these points. */
   readonly joints: Uint16Array;
   /** [extra point]: index of the joint that it moves with. */
   readonly extraJoints: Uint16Array;

@@ -84,8 +84,8 @@ constexpr double kExpectedStepS = 0.6;
 constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
 
 // Steps that would climb or descend by more than kEasyClimbM are shortened to fractions of their
-// length. This applies if the shorter step still leads onto ground that is at least kLeastClimbM
-// higher or lower than the standing foot. People do not skip treads of stairs either.
+// length, so that avatars do not skip treads of stairs. This applies if the shorter step still
+// leads onto ground that is at least kLeastClimbM higher or lower than the standing foot.
 constexpr double kEasyClimbM = 0.18;
 // Replaces kEasyClimbM on slopes, where the y component of the ground normal is at most
 // kSlopeNormalY.
