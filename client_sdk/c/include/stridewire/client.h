@@ -424,9 +424,9 @@ typedef struct stridewire_observation {
   size_t avatar_count;
   /// Detail of the poses. Values other than 0 require STRIDEWIRE_QUANTISED.
   stridewire_pose_detail detail;
-  /// Observes the avatars inside this region. NULL: no region. `avatars` must then be NULL. The
-  /// events ENTERED and LEFT report changes. A region must be the only observation of its world
-  /// (NOT_ALLOWED).
+  /// Observes the avatars inside this region, which requires that `avatars` is NULL. NULL: no
+  /// region. The events ENTERED and LEFT report changes. A client that observes a region of a world
+  /// cannot have other observations of that world (NOT_ALLOWED).
   const stridewire_region* region;
 } stridewire_observation;
 

@@ -145,8 +145,8 @@ struct PlannedStep {
 
 class StepPlanner {
  public:
-  // If `checks_ground` is false, every place is accepted, at the height of the ground. This is used
-  // for looking ahead.
+  // If `checks_ground` is false, the ground determines only the height of a footprint, and not
+  // whether it can support the foot. The planner uses this to look ahead.
   StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance,
               bool checks_ground)
       : library_(library),

@@ -83,7 +83,7 @@ class EndPoses {
   const MotionGroup* group_ = nullptr;
   // [foot]: joints from the joint of the ball to the root.
   std::array<std::vector<int>, 2> chains_;
-  double sign_ = 1.0;  // +1 if "left minus right" is "moving minus fixed", and -1 otherwise.
+  double sign_ = 1.0;  // -1 if the right foot is the moving foot, and +1 otherwise.
   double heading_change_rad_ = 0.0;
   double sine_ = 0.0;  // Sine and cosine of heading_change_rad_.
   double cosine_ = 1.0;
