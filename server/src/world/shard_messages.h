@@ -17,8 +17,8 @@
 #include "world/world.h"
 
 /// All messages between the threads of the server: from shard to shard (ShardMessage), and between
-/// the shards and the main thread (ServerMessage, ShardMessage). They are values, which the receiver
-/// owns. Shard::Post and ServerThread::Post are the only ways to send them.
+/// the shards and the main thread (ServerMessage, ShardMessage). They are values, which the
+/// receiver owns. Shard::Post and ServerThread::Post are the only ways to send them.
 ///
 ///   session's shard                      avatars' shard               main thread
 ///     | WorldCommand, InspectRequest,          |                           |
