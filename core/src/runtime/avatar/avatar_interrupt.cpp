@@ -181,6 +181,9 @@ bool AvatarSimulation::Redirect(PlanScratch& scratch) {
   const double phase = StepPhase();
   // While both feet stand, the next movement may start at once, so the step is not redirected.
   if (phase <= 1.0 || phase >= 2.0 - kLeastSwingLeft) return false;
+  // Without footprints, the plan depends on where the pose puts the standing foot. The pose of the
+  // last tick may not have been evaluated.
+  if (!body_.plants_feet) body_.Evaluate(movement_time_s_);
   const auto redirection = PlanRedirection(phase);
   may_redirect_ = false;
   if (!redirection) return false;

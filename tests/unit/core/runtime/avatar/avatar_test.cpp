@@ -359,6 +359,34 @@ TEST_F(AvatarTest, DoesNotPlantFeetIfTheLegsShareAnAnkle) {
   EXPECT_GT(avatar.pose().root_position_m.z, 0.1f);
 }
 
+// A server evaluates a pose only if a client needs it.
+TEST(AvatarSimulation, MovesAlikeWhetherPosesAreEvaluatedOrNot) {
+  const auto library = OpenLibrary("builtin").value();
+  PlanScratch scratch(*library);
+  for (int interrupted = 12; interrupted < 40; interrupted += 3) {
+    AvatarSimulation evaluated(library, BaseFrame{}, {.foot_planting = false});
+    AvatarSimulation state_only(library, BaseFrame{}, {.foot_planting = false});
+    AvatarSimulation* const one = &state_only;
+    for (int tick = 0; tick < 120; ++tick) {
+      for (AvatarSimulation* avatar : {&evaluated, one}) {
+        if (tick == 0) {
+          ASSERT_TRUE(avatar->Enqueue({.movement = StepRequest{.foot = Foot::kLeft}}));
+        } else if (tick == interrupted) {
+          ASSERT_TRUE(avatar->Enqueue(
+              {.movement = StepRequest{.foot = Foot::kLeft, .at = {{{0.15, 0.0, 0.5}, 0.1}}},
+               .interrupt = Interrupt::kNow}));
+        }
+      }
+      evaluated.Advance(1.0 / 60.0);
+      AvatarSimulation::AdvanceStates({&one, 1}, 1.0 / 60.0, scratch, nullptr);
+      ASSERT_EQ(evaluated.movement_time_s(), state_only.movement_time_s()) << tick;
+    }
+    state_only.UpdatePose();
+    EXPECT_EQ(evaluated.pose().root_position_m, state_only.pose().root_position_m) << interrupted;
+    EXPECT_TRUE(std::ranges::equal(evaluated.pose().rotations, state_only.pose().rotations));
+  }
+}
+
 // A moving avatar is event-free between its events. A request that changes the current movement
 // ends that at once, and no event may occur while the avatar is event-free.
 TEST(AvatarSimulation, IsEventFreeOnlyWithoutEvents) {
