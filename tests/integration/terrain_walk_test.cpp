@@ -25,8 +25,10 @@ constexpr double kLargestKneeDeg = 130.0;
 constexpr double kMostDriftM = 0.001;
 constexpr double kLeastClearanceM = 0.01;
 // A foot is over an edge if the ground below its heel or toes is this much below the ground at its
-// ball, on slopes of up to 20 degrees.
+// ball, on slopes of up to 20 degrees. Toes that tilt to the ground after a heel strike may be over
+// the edge by a few millimetres.
 constexpr double kEdgeM = 0.1;
+constexpr double kOverhangM = 0.005;
 
 struct Walker {
   const char* name;
@@ -151,9 +153,11 @@ bool IsOverEdge(LegGeometry& legs, const Clip& clip, std::size_t frame, Foot foo
                 const Terrain& ground) {
   legs.Set(clip.frame(static_cast<int>(frame)));
   const auto [heel, ball, toe] = legs.Sole(foot);
-  const double stands_m = ground.HeightAt(ball.x, ball.z);
-  return std::min(ground.HeightAt(heel.x, heel.z), ground.HeightAt(toe.x, toe.z)) <
-         stands_m - kEdgeM;
+  const auto is_over = [&, &ball = ball](const auto& end) {
+    const auto nearer = end + kOverhangM * glm::normalize(ball - end);
+    return ground.HeightAt(nearer.x, nearer.z) < ground.HeightAt(ball.x, ball.z) - kEdgeM;
+  };
+  return is_over(heel) || is_over(toe);
 }
 
 Looks LookAt(const char* name, const Library& library, const Course& course) {

@@ -9,6 +9,7 @@
 #include "offline/base/text.h"
 #include "offline/capture/glitch_repair.h"
 #include "offline/capture/joint_noise.h"
+#include "offline/capture/root_noise.h"
 #include "offline/extract/body_tracks.h"
 #include "offline/extract/explain.h"
 #include "offline/extract/ground.h"
@@ -111,6 +112,9 @@ class Extractor {
   }
 
   void RemoveNoise() {
+    if (RemoveRootNoise(capture_.skeleton, first_frame_, clip_)) {
+      out_.notes.push_back("smoothed the pelvis, which shakes");
+    }
     std::string names;
     for (const int joint : RemoveJointNoise(capture_.skeleton, first_frame_, clip_)) {
       names += (names.empty() ? "" : ", ") +
