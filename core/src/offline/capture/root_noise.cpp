@@ -22,6 +22,7 @@ constexpr double kLongestReach = 0.9999;
 
 std::size_t Slot(int i) { return static_cast<std::size_t>(i); }
 
+// Returns the value that a fraction of kPercentile of `values` does not exceed. Reorders them.
 double PercentileOf(std::vector<double>& values) {
   if (values.empty()) return 0.0;
   const auto rank =
@@ -30,7 +31,7 @@ double PercentileOf(std::vector<double>& values) {
   return values[Slot(static_cast<int>(rank))];
 }
 
-// Returns twice the vector part of the small rotation from `a` to `b`: about its rotation vector.
+// Returns the small rotation from `a` to `b` as a rotation vector.
 Vec3 SmallRotation(const Quat& a, const Quat& b) {
   const Quat turn = glm::conjugate(a) * b;
   return (turn.w < 0.0f ? -2.0f : 2.0f) * Vec3(turn.x, turn.y, turn.z);
