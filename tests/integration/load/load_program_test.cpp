@@ -210,7 +210,9 @@ TEST(LoadProgram, RunsAChoreographyInSeveralWorldsAndThreads) {
   ExpectNoErrorsButLateness(report);
   EXPECT_EQ(report["requests"]["sent"].get<int>() % 4, 0);
   EXPECT_GE(report["requests"]["accepted"], 40);
-  EXPECT_GE(report["steps_measured"], 10);
+  // Avatars start at random times soon after they are spawned. On a slow machine, some complete
+  // their first step before the program starts to count.
+  EXPECT_GE(report["steps_measured"], 5);
 }
 
 TEST(LoadProgram, ExcusesPosesOfDroppedObservers) {
