@@ -19,6 +19,7 @@ using Json = nlohmann::ordered_json;
 // numbers, and opaque bytes hexadecimal digits.
 
 [[nodiscard]] inline Json Value(std::uint64_t value) { return std::to_string(value); }
+[[nodiscard]] Json Value(const Quat& q);
 [[nodiscard]] Json Value(const std::vector<std::byte>& bytes);
 [[nodiscard]] Json Value(const ParameterSet& set);
 [[nodiscard]] inline Json Value(const std::string& text) { return text; }
@@ -56,6 +57,7 @@ void FromJson(const Json& json, E& out) {
   out = static_cast<E>(json.get<std::underlying_type_t<E>>());
 }
 inline void FromJson(const Json& json, std::string& out) { json.get_to(out); }
+void FromJson(const Json& json, Quat& q);
 void FromJson(const Json& json, std::vector<std::byte>& out);
 void FromJson(const Json& json, ParameterSet& set);
 template <typename V>

@@ -1,5 +1,6 @@
 #include "message_json.h"
 
+#include <deque>
 #include <stdexcept>
 #include <string>
 
@@ -10,6 +11,8 @@
 #include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {
+
+Json Value(const Quat& q) { return Json::array({q.x, q.y, q.z, q.w}); }
 
 Json Value(const std::vector<std::byte>& bytes) {
   static constexpr char kDigits[] = "0123456789abcdef";
@@ -39,6 +42,22 @@ Json Value(const ParameterSet& set) {
   return json;
 }
 
+namespace {
+
+/// Calls `visit` for the JSON name and the value of each field of a batch except its lists.
+void VisitInfo(auto& info, auto visit) {
+  visit("world", info.world);
+  visit("shard", info.shard);
+  visit("part", info.part);
+  visit("parts", info.parts);
+  visit("tick", info.tick);
+  visit("server_time_s", info.server_time_s);
+  visit("mode", info.mode);
+  visit("joint_count", info.joint_count);
+}
+
+}  // namespace
+
 Json Fields(const PoseBatch& m) {
   Json poses = Json::array();
   std::vector<Quat> rotations(m.info.joint_count);
@@ -47,22 +66,14 @@ Json Fields(const PoseBatch& m) {
     Vec3 root(0.0f);
     reader.Next();
     STRIDEWIRE_CHECK(reader.Decode(root, rotations));
-    Json quats = Json::array();
-    for (const Quat& q : rotations) quats.push_back(Json::array({q.x, q.y, q.z, q.w}));
     poses.push_back({{"avatar", m.avatars[i]},
                      {"flags", m.flags[i]},
                      {"root_position_m", Value(root)},
-                     {"rotations", quats}});
+                     {"rotations", Value(rotations)}});
   }
-  Json json = {{"world", m.info.world},
-               {"shard", m.info.shard},
-               {"part", m.info.part},
-               {"parts", m.info.parts},
-               {"tick", Value(m.info.tick)},
-               {"server_time_s", m.info.server_time_s},
-               {"mode", Value(m.info.mode)},
-               {"joint_count", m.info.joint_count},
-               {"poses", poses}};
+  Json json;
+  VisitInfo(m.info, [&](const char* name, const auto& value) { json[name] = Value(value); });
+  json["poses"] = poses;
   if (m.info.is_partial) json["partial"] = true;
   return json;
 }
@@ -85,6 +96,49 @@ void FromJson(const Json& json, RotationQuantization& m) {
   Get(json, "least_w", m.least_w);
 }
 
+void FromJson(const Json& json, Quat& q) {
+  q = Quat(json.at(3), json.at(0), json.at(1), json.at(2));
+}
+
+void FromJson(const Json& json, PoseBatch& m) {
+  struct Arrays {
+    std::vector<AvatarId> avatars;
+    std::vector<std::uint8_t> flags;
+    std::vector<std::byte> poses;
+  };
+  // The batch borrows its arrays. They are never freed, because tests use few batches.
+  static std::deque<Arrays> kept;
+  auto& [avatars, flags, poses] = kept.emplace_back();
+  VisitInfo(m.info, [&](const char* name, auto& value) { Get(json, name, value); });
+  Get(json, "partial", m.info.is_partial);
+  const CompactCodec* codec = SampleCodecs().Find(m.info.mode);
+  for (const Json& pose : json.contains("poses") ? json["poses"] : Json()) {
+    Get(pose, "avatar", avatars.emplace_back());
+    Get(pose, "flags", flags.emplace_back());
+    Vec3 root(0.0f);
+    std::vector<Quat> rotations;
+    Get(pose, "root_position_m", root);
+    Get(pose, "rotations", rotations);
+    std::vector<std::byte> bytes;
+    if (codec != nullptr && (flags.back() & kPoseUncompressed) == 0) {
+      CompactCodec::Block block;
+      block.Add(root, rotations);
+      codec->Encode(block);
+      STRIDEWIRE_CHECK(block.fits(0));
+      bytes.resize(codec->pose_bytes());
+      block.CopyBytes(0, bytes);
+    } else {
+      const PoseMode mode = codec != nullptr ? PoseMode::kQuantised : m.info.mode;
+      bytes.resize(PoseBytes(mode, rotations.size()));
+      STRIDEWIRE_CHECK(EncodePose(mode, root, rotations, bytes));
+    }
+    poses.insert(poses.end(), bytes.begin(), bytes.end());
+  }
+  m.avatars = avatars;
+  m.flags = flags;
+  m.poses = poses;
+}
+
 void FromJson(const Json& json, ParameterSet& set) {
   set = {};
   for (const Json& parameter : json) {
@@ -105,17 +159,15 @@ Json ToJson(const Message& message) {
 
 Message FromJson(const Json& json) {
   const auto name = json.at("type").get<std::string>();
-#define STRIDEWIRE_CASE(Struct, Name, ...)            \
-  if constexpr (!std::is_same_v<Struct, PoseBatch>) { \
-    if (name == #Name) {                              \
-      Struct message;                                 \
-      FromJson(json.at("fields"), message);           \
-      return message;                                 \
-    }                                                 \
+#define STRIDEWIRE_CASE(Struct, Name, ...) \
+  if (name == #Name) {                     \
+    Struct message;                        \
+    FromJson(json.at("fields"), message);  \
+    return message;                        \
   }
   STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)
 #undef STRIDEWIRE_CASE
-  throw std::invalid_argument("no message \"" + name + "\" can be read from JSON");
+  throw std::invalid_argument("unknown message \"" + name + "\"");
 }
 
 }  // namespace stridewire::protocol

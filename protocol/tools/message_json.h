@@ -11,9 +11,9 @@ namespace stridewire::protocol {
 /// hexadecimal, enumerators are numbers, and poses are decoded.
 [[nodiscard]] nlohmann::ordered_json ToJson(const Message& message);
 
-/// Converts the JSON of ToJson back to a message. This is not possible for PoseBatch. Throws
-/// std::invalid_argument for an unknown type, and the exceptions of nlohmann::json if members have
-/// other types.
+/// Converts the JSON of ToJson back to a message. A PoseBatch borrows arrays that are never freed.
+/// Throws std::invalid_argument for an unknown type, and the exceptions of nlohmann::json if
+/// members have other types.
 [[nodiscard]] Message FromJson(const nlohmann::ordered_json& json);
 
 }  // namespace stridewire::protocol
