@@ -112,8 +112,8 @@ struct GridLayout {
 /// Number of floats in the longest possible grid row.
 inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 
-/// Beginning of MotionGroup::sources of the examples that were generated because the captures lack
-/// such movements.
+/// The entries of MotionGroup::sources begin with this prefix for examples that were generated
+/// because the captures lack such movements.
 inline constexpr std::string_view kCompletedSource = "completed";
 
 /// Maximum time over which a difference pose fades out (T in Section 5 of the paper), in seconds.

@@ -91,7 +91,7 @@ class Terrain {
 
   /// Returns an upper bound for the height of the ground in a closed disc. It is exact for boxes
   /// and for y = 0 outside the field. For the field, it is the maximum over the square that
-  /// encloses the disc. A radius <= 0 stands for a point. The time grows with the square of the
+  /// encloses the disc. A radius <= 0 is treated as 0. The time grows with the square of the
   /// radius.
   [[nodiscard]] double HighestWithin(double x_m, double z_m, double radius_m) const;
 
