@@ -65,8 +65,9 @@ struct CardinalBasisFit {
   /// weight below 1e-9 are ignored.
   ///
   /// Errors: kShapeMismatch if the sizes of the spans do not match. kOutOfRange if a number is not
-  /// finite or not positive. kIllConditioned if two sites are closer than kMinSiteDistance (index:
-  /// the site), or if the condition number of R is above kMaxCondition.
+  /// finite, or if a scale or radius factor is not positive. kIllConditioned if two sites are
+  /// closer than kMinSiteDistance (index: the site), or if the condition number of R is above
+  /// kMaxCondition.
   [[nodiscard]] Expected<CardinalBasis> Run() const;
 };
 

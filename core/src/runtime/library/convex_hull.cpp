@@ -9,9 +9,9 @@
 #include "stridewire/runtime/motion_library.h"
 
 // Wolfe's algorithm finds the point of smallest norm in a polytope. It keeps a "corral", a set of
-// affinely independent vertices. Each round adds the vertex that is furthest towards the origin.
-// Then it drops vertices until the point of smallest norm in the affine hull of the corral is
-// inside the corral:
+// affinely independent vertices. Each round adds the vertex that is furthest in the direction from
+// the current point to the origin. Then it drops vertices until the point of smallest norm in the
+// affine hull of the corral is inside the corral:
 //
 //            o  origin (= the target)
 //            |

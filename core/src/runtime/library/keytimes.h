@@ -25,8 +25,8 @@ inline constexpr double kMinIntervalS = 1e-3;
 /// The inverse of GenericTime. `generic_time` is clamped to [0, n].
 [[nodiscard]] double TimeAtGenericTime(std::span<const double> keytimes_s, double generic_time);
 
-/// A blended interval is clamped to these multiples of the mean of that interval over the examples
-/// with positive weights.
+/// A blended interval is clamped to these multiples of the weighted mean of that interval over the
+/// examples with positive weights.
 inline constexpr double kShortestInterval = 0.75;
 inline constexpr double kLongestInterval = 4.0 / 3.0;
 
