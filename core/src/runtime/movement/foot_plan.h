@@ -14,9 +14,9 @@ namespace stridewire {
 ///               then a cubic that continues with the same offset and velocity and ends at
 ///               t >= land: to - b(t)
 ///   heading:    locked while the sole is on the ground; with the heel up it follows the blend
-///   height:     values to add, eased from one to the next, and `level_m`. The height of the ball
-///               otherwise follows the blend, because a lock would bend knees by 25 degrees on
-///               captures (but see locks_height)
+///   height:     follows the blend, plus corrections that ease from one value to the next, plus
+///               `level_m`. It is not locked (but see locks_height), because in captured libraries
+///               a lock would bend knees by 25 degrees
 struct FootTrajectory {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -114,10 +114,9 @@ struct FootPlan {
   bool keeps_above_ground = false;
   /// Root of the displayed pose minus that of the planted pose when the plant fade began.
   Vec3 plant_fade_root_m = Vec3(0.0f);
-  std::array<std::array<Quat, 3>, 2>
-      /// [foot]: rotations of hip, knee and ankle from the planted to the displayed pose when the
-      /// plant fade began.
-      plant_fade_rotations{};
+  /// [foot]: rotations of hip, knee and ankle from the planted to the displayed pose when the plant
+  /// fade began.
+  std::array<std::array<Quat, 3>, 2> plant_fade_rotations{};
   DVec3 missed_m = DVec3(0.0);  ///< Horizontal vector from the planned to the requested footprint.
   /// Difference between the headings of the planned and the requested footprint.
   double missed_rad = 0.0;

@@ -53,12 +53,12 @@ struct LiftCurve {
 // would lift it far too high.
 inline constexpr LiftCurve kLiftCurves[3] = {
     {0.0, 0.22, 0.22, 0.6}, {0.0, 0.35, 0.65, 1.0}, {0.4, 0.78, 0.78, 1.0}};
-// Flatness (LegPose::Flatness) of a standing foot at which its heading lock has no effect (kHeelUp)
-// and its full effect (kSoleDown).
+// Flatness of a standing foot (LegPose::Flatness). Up to kHeelUp, the heading lock has no effect,
+// and from kSoleDown on it has its full effect.
 inline constexpr double kHeelUp = 0.5;
 inline constexpr double kSoleDown = 0.8;
-// Angle between the direction from ankle to ball and the footprint at which the lock has its full
-// effect (kAheadRad) and no effect (kReversedRad).
+// Angle between the heading of a standing foot and that of its footprint. Up to kAheadRad, the
+// heading lock has its full effect, and from kReversedRad on it has none.
 inline constexpr double kAheadRad = 1.0;
 inline constexpr double kReversedRad = 2.0;
 

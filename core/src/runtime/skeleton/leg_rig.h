@@ -81,10 +81,8 @@ struct LegRig {
   [[nodiscard]] const Side& side(Foot foot) const { return sides[static_cast<std::size_t>(foot)]; }
 };
 
-inline constexpr double kSoleBehindAnkleM =
-    /// Distance of the heel behind the ankle. It is an assumption, because skeletons have no heel
-    /// joint.
-    0.06;
+/// Assumed distance of the heel behind the ankle. Skeletons have no heel joint.
+inline constexpr double kSoleBehindAnkleM = 0.06;
 
 /// `knee_hinges` [foot]: see LegRig::Side::hinge.
 [[nodiscard]] LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
