@@ -329,8 +329,9 @@ class StepPlanner {
     return support.normal.y < kSlopeNormalY;
   }
 
-  // Returns the footprint. If the step would climb or descend too much, or if it would climb and
-  // also be long, moves the footprint back towards the standing foot.
+  // Returns the footprint. If the step would climb or descend more than is easy, moves the
+  // footprint back towards the standing foot: onto a tread in between or, if there is none and the
+  // step is long, to the ground in front of the edge.
   Footprint WithEasyClimb(const Footprint& print) const {
     const auto climb_m = [&](const Footprint& at) {
       return terrain_->HeightAt(at.position_m.x, at.position_m.z) - fixed_m_.y;

@@ -21,7 +21,8 @@ struct WalkStance {
   double last_step_s = 0.0;  ///< Duration of the previous step. 0 if the avatar is not walking.
   /// True if feet land exactly on their footprints. False without foot planting.
   bool is_exact = true;
-  /// [foot]: true if the last step of this foot in the current walk led to its place at the goal.
+  /// [foot]: true if the last step of this foot in the current walk was aimed at its footprint at
+  /// the goal.
   std::array<bool, 2> is_aimed{};
 };
 
@@ -35,7 +36,7 @@ struct WalkProgress {
   /// True if a step of this walk was changed because the ground at its footprint does not support a
   /// foot.
   bool is_detour = false;
-  /// [foot]: true if the last step of this foot led to its place at the goal.
+  /// [foot]: as in WalkStance.
   std::array<bool, 2> is_aimed{};
 };
 
