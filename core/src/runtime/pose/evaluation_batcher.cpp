@@ -9,7 +9,7 @@ namespace {
 // The radix sort takes two passes, one per half of the key.
 constexpr int kHalfBits = 11;
 constexpr std::uint32_t kHalfMask = (1u << kHalfBits) - 1;
-// In the sort key, the time within a movement is one of this many parts.
+// The sort key divides the time within a movement into this many parts.
 constexpr std::uint32_t kParts = 64;
 
 }  // namespace

@@ -113,8 +113,9 @@ struct SoaLeg {
 
 HWY_INLINE SoaVec3 Broadcast(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
-// Calls `step` for both legs alternately. Each computation for a leg depends on the previous one.
-// The processor can therefore work on one leg while results of the other are pending.
+// Calls `step` for the left and then for the right leg. Each step of a leg depends on its previous
+// one. Because the steps of both legs alternate, the processor can work on one leg while it waits
+// for results of the other.
 template <typename Step>
 HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[0], std::size_t{0});

@@ -22,7 +22,7 @@ struct GridSample {
   return std::min(sample.first_point + k, group.grid_point_count - 1);
 }
 
-/// Sets the piece of a movement's time warp for a lane.
+/// Copies a piece of a time warp to a lane of `times`.
 inline void SetWarpPiece(const TimeWarp::Piece& piece, std::size_t lane,
                          kernels::GridTimes& times) {
   times.begin_s[lane] = piece.begin_s;
@@ -33,7 +33,7 @@ inline void SetWarpPiece(const TimeWarp::Piece& piece, std::size_t lane,
   times.end_slope[lane] = piece.end_slope;
 }
 
-/// Sets a lane to a time of a movement.
+/// Sets a lane of `times` to a time of a movement.
 inline void SetGridTime(const MotionGroup& group, const Movement& movement, double time_s,
                         std::size_t lane, kernels::GridTimes& times) {
   times.time_s[lane] = time_s;

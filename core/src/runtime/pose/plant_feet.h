@@ -90,7 +90,8 @@ void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, 
 
 /// Plants the feet of a blended pose with its difference pose. Shifts the root by the weighted
 /// corrections of the feet, lowers it until both legs reach their targets, and bends the legs
-/// accordingly. Never allocates. Gives the same bytes on every machine.
+/// accordingly. Raises the heels of feet whose ankles would bend too far. Never allocates. Gives
+/// the same bytes on every machine.
 void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
 }  // namespace stridewire

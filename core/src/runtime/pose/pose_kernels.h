@@ -176,7 +176,7 @@ struct PlantPosesJob {
   const double* time_s;  ///< [kBlock]: time since the start of the movement
   const double* base_m;  ///< [x y z][kBlock]: base position of the movement
   float* root_m;         ///< [x y z][kBlock]: root positions in world space; changed by planting
-  /// [joint][x y z w][kBlock]: rotations; those of hips, knees and ankles are changed
+  /// [joint][x y z w][kBlock]: rotations; planting changes those of hips, knees, ankles and toes
   float* rotations;
 };
 /// Plants the feet of the first `count` lanes, as PlantFeet does. `rig` must be usable.
@@ -188,7 +188,7 @@ struct PlantPoseJob {
   double time_s = 0.0;          ///< Time since the start of the movement
   double base_m[3] = {};        ///< Base position of the movement
   float* root_m = nullptr;      ///< [3]: root position in world space; changed by planting
-  /// [joint] x y z w: rotations; those of hips, knees and ankles are changed
+  /// [joint] x y z w: rotations; planting changes those of hips, knees, ankles and toes
   float* rotations = nullptr;
 };
 /// Plants the feet of one pose. The result has the same bytes as that of PlantPoses.

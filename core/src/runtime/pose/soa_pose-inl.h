@@ -61,11 +61,12 @@ void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::
   }
 }
 
-// Remaining difference poses in the lanes of one vector.
+// Describes which lanes of one vector still have a difference pose ("eased"), which of them also
+// add its velocity ("inertial"), and how much of both remains.
 struct DifferenceState {
   bool is_any = false;
   bool is_any_inertial = false;
-  // True if all lanes are eased and inertial, so that no lanes must be masked out.
+  // True if every lane is eased and inertial. No results must be masked then.
   bool are_all = false;
   Mask is_eased, is_inertial;
   Float fraction, half_s;

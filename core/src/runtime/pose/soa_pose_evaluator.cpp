@@ -43,7 +43,8 @@ struct SoaPoseEvaluator::Work {
   struct LaneDoubles {
     alignas(64) double of[kBlock] = {};
   };
-  // Number of movements that BlendRows blends together. Their sums fit into the level-1 cache.
+  // Maximum number of movements that BlendRows blends together. Their sums fit into the level-1
+  // cache.
   static constexpr std::size_t kMaxBlended = 8;
   static float* FloatsOf(std::vector<LaneFloats>& lanes) { return lanes.front().of; }
 
@@ -95,7 +96,7 @@ struct SoaPoseEvaluator::Work {
 
   std::vector<kernels::GridSamples> samples;  // [pose]
   std::vector<LaneDoubles> times;             // [pose]
-  std::vector<LaneFloats> ring;               // [kRun][4][row_floats]
+  std::vector<LaneFloats> ring;               // [kMaxBlended][4][row_floats]
   std::vector<LaneFloats> rows;               // [pose][lane][row_floats]
   kernels::GridTimes grid_times = {};         // Initialized, because unused lanes are computed too.
   std::array<LaneDoubles, 3> base_m;
@@ -109,7 +110,7 @@ struct SoaPoseEvaluator::Work {
   LaneFloats is_inertial_lane;
   std::vector<float> zeros;  // Zeros, for lanes without a difference pose.
   SoaPose poses;
-  Pose scratch;  // scratch
+  Pose scratch;  // The pose of one lane, for ApplyPlantFade.
 };
 
 // Finds the position of each pose in its grid.
