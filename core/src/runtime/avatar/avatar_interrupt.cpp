@@ -15,7 +15,7 @@ namespace {
 
 // Maximum distance by which the swinging foot may land behind its current position, in metres.
 constexpr double kMaxSwingBackM = 0.06;
-// Distance ahead of its current position at which a foot that has to land early lands, in metres.
+// A foot whose swing is cut short lands this far ahead of its current position, in metres.
 constexpr double kEarlyLandingM = 0.12;
 
 // Returns a request for a step that the avatar plans itself, during a walk or to bring the feet

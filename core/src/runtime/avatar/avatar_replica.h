@@ -55,10 +55,9 @@ class AvatarReplica {
   /// Advances replicas by one tick and evaluates their poses. All must have the same library, and
   /// each may occur only once. Replicas without a known state are skipped. A movement that does not
   /// change is evaluated for several ticks at once, which reads the library less often. Pass the
-  /// replicas in
-  /// the same order in every tick, because their positions determine in which ticks they are
-  /// evaluated. `dt_s` must be the same in all calls, unless the replica receives a state in
-  /// between.
+  /// replicas in the same order in every tick, because their positions in the list determine in
+  /// which ticks they are evaluated. `dt_s` must be the same in all calls until all replicas
+  /// receive new states.
   static void AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
                          ReplicaEvaluator& evaluator);
 

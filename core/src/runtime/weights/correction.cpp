@@ -12,7 +12,8 @@ namespace stridewire {
 namespace {
 
 constexpr std::size_t kMaxRows = kMaxParameters + 1;  // Rows of [J; 1].
-// Error per parameter in metres. A radian counts as kMetresPerRadian.
+// One number per row of [J; 1]. Errors of parameters are in metres; a radian counts as
+// kMetresPerRadian.
 using Vector = std::array<double, kMaxRows>;
 using Matrix = std::array<Vector, kMaxRows>;
 
