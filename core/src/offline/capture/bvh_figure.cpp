@@ -52,8 +52,9 @@ class FigureBuilder {
   // A joint of the file that belongs to the figure.
   struct KeptJoint {
     int source = 0;
-    int parent = -1;           // In the figure.
-    bool is_attached = false;  // A child of the root whose parent in the file is above the root.
+    int parent = -1;  // In the figure.
+    // True for a child of the figure's root that the file attaches to a joint above that root.
+    bool is_attached = false;
   };
 
   // Finds the legs of every root of the file, and selects the first one that has legs.

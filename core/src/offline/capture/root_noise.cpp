@@ -22,7 +22,7 @@ constexpr double kLongestReach = 0.9999;
 
 std::size_t Slot(int i) { return static_cast<std::size_t>(i); }
 
-// Returns the value that a fraction of kPercentile of `values` does not exceed. Reorders them.
+// Returns the quantile kPercentile of `values`, which it reorders.
 double PercentileOf(std::vector<double>& values) {
   if (values.empty()) return 0.0;
   const auto rank =
@@ -67,7 +67,7 @@ class GaussianMean {
   }
 
  private:
-  // Near the ends, the window becomes shorter on both sides, so that means do not lag behind.
+  // Near the ends of the track, the window becomes shorter on both sides, so that it stays centred.
   template <typename Visit>
   void ForEach(int frame, const Visit& visit) const {
     const int reach = std::min({static_cast<int>(weights_.size()) - 1, frame, count_ - 1 - frame});
@@ -93,7 +93,7 @@ DQuat ShortestRotation(const DVec3& from, const DVec3& to) {
   return glm::dot(q, q) > 1e-12 * scale * scale ? glm::normalize(q) : DQuat(1.0, 0.0, 0.0, 0.0);
 }
 
-// Rotates thigh and shank so that the leg leads from `hip_m` to `ankle_m`. The knee bends in the
+// Rotates thigh and shank so that the leg reaches from `hip_m` to `ankle_m`. The knee bends in the
 // plane of the leg in `before`, and the foot keeps its rotation in the world.
 void PlaceAnkle(const Leg& leg, const WorldPose& before, const Vec3& ankle_m, const Vec3& hip_m,
                 const Quat& parent, PoseSpan pose) {
@@ -128,7 +128,7 @@ bool IsPlainLeg(const Skeleton& skeleton, const Leg& leg) {
          skeleton.joints[Slot(leg.ankle)].parent == leg.knee;
 }
 
-// Returns the joints between the root and a hip, without the root, the hip last.
+// Returns the joints on the path from the root to a hip, without the root but with the hip.
 std::vector<int> JointsToHip(const Skeleton& skeleton, int hip) {
   std::vector<int> joints;
   for (int j = hip; j > 0; j = skeleton.joints[Slot(j)].parent) joints.push_back(j);

@@ -6,20 +6,21 @@
 namespace stridewire {
 
 /// Removes noise from the root in place (decision 0059). The rotation and position of the pelvis
-/// follow from a few markers on the waist. If these slip, the pelvis shakes from frame to frame
-/// while the feet stand still, because the hips compensate it. In an avatar, the pelvis would shake
-/// visibly, above all where steps are played faster.
+/// follow from a few markers on the waist. If these markers slip, the pelvis shakes from frame to
+/// frame. The feet stand still nevertheless, because the hips compensate for the shaking. In an
+/// avatar, the pelvis would shake visibly, especially where steps are played faster.
 ///
 /// The root is filtered if its angular acceleration exceeds 600 rad/s^2, or its acceleration 90
 /// m/s^2, in more than 10 % of the frames. A Gaussian mean halves the amplitude at 12 Hz.
 ///
-/// - The positions of the ankles in the world are filtered like that of the root. Feet keep their
-///   rotations in the world. The legs bend in their planes.
-/// - The rotations in the world of the other children of the root, such as the spine, are filtered
-///   like that of the root.
+/// - The world positions of the ankles are filtered in the same way. The feet keep their world
+///   rotations, and each knee bends in the plane of its leg.
+/// - The world rotations of the other children of the root, such as the spine, are filtered in the
+///   same way.
 ///
-/// Frames before `first_frame` remain unchanged. Returns false if the root was not filtered, also
-/// if the joints of a leg do not follow one another.
+/// Frames before `first_frame` remain unchanged. Returns false and changes nothing if the limits
+/// are not exceeded, if there are fewer than three frames, or if a leg has other joints between
+/// hip, knee and ankle.
 bool RemoveRootNoise(const Skeleton& skeleton, int first_frame, Clip& clip);
 
 }  // namespace stridewire
