@@ -13,8 +13,8 @@ namespace stridewire {
 /// memory.
 ///
 /// Errors: kMalformed for invalid JSON, kOutOfRange for a number too large for a double, and
-/// kLimitExceeded for too deep nesting. Error::where is "name:line:column". Lines and columns count
-/// from 1, and columns are in bytes.
+/// kLimitExceeded if values are nested too deeply. Error::where is "name:line:column". Lines and
+/// columns count from 1, and columns are in bytes.
 [[nodiscard]] Expected<nlohmann::json> ParseJson(std::string_view text, std::string_view name,
                                                  int max_depth);
 

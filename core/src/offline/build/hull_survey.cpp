@@ -18,7 +18,7 @@ constexpr int kPeaks = 8;
 // Minimum distance between the starting points of ascents, in scaled parameters.
 constexpr double kPeakDistance = 0.3;
 constexpr int kClimbRounds = 24;
-constexpr double kSlopeStep = 1e-3;  // Scaled.
+constexpr double kSlopeStep = 1e-3;  // In scaled parameters.
 constexpr double kFirstStride = 0.1;
 constexpr double kLastStride = 2e-3;
 

@@ -143,7 +143,7 @@ std::vector<double> NearestWeights(const MotionGroup& group, int left_out, std::
   return weights;
 }
 
-// Compares one excluded movement with its synthesis by one method.
+// Differences between one excluded movement and its synthesis by one method.
 struct Comparison {
   bool is_valid = false;
   PoseError pose;

@@ -59,9 +59,9 @@ class PoseComparison {
   std::vector<Quat> rotations_;
 };
 
-/// Samples a normalised clip at the grid points of a group. The times follow from the keytimes of
-/// the clip by Eq. (3). `cells[i]` is the number of cells of keytime interval i. `keytimes_s` must
-/// have one more value than `cells`.
+/// Samples a clip at the grid points of a group. The times of the grid points follow from the
+/// keytimes of the clip (TimeWarp). `cells[i]` is the number of cells of keytime interval i.
+/// `keytimes_s` must have one more value than `cells`.
 [[nodiscard]] std::vector<Pose> PosesAtGridPoints(const Clip& clip,
                                                   std::span<const double> keytimes_s,
                                                   std::span<const int> cells);

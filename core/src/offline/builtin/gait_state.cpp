@@ -12,7 +12,7 @@
 namespace stridewire::builtin {
 namespace {
 
-// On stairs, the heel rises further, so that the ankle of a leg with a bent knee can stay lower.
+// Additional pitch of the foot at toe-off per metre of height difference between the feet.
 constexpr double kRiseHeel_deg_m = 60.0;
 constexpr double kMinStairsStepS = 0.72;
 // Additional duration of a step in seconds per metre of height difference.

@@ -48,8 +48,8 @@ std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& 
 }
 
 // Returns the contacts of a movement without planting, from its keytimes. The fixed foot of a step
-// always stands. The moving foot stands before toe-off and after heel-strike. In a jump, both feet
-// stand before toe-off and after landing.
+// stands from start to end. Of the moving foot, only the contact after heel-strike is returned. In
+// a jump, both feet stand before toe-off and after landing.
 std::vector<PlantRecord> PlantsOf(const MovementRecord& record) {
   std::vector<PlantRecord> plants;
   const std::size_t n = record.keytimes_s.size() - 1;

@@ -22,7 +22,7 @@ constexpr double kMaxFeetWidthM = 0.5;
 constexpr double kMaxKneeRad = 1.2;
 constexpr double kMaxKneeDifferenceRad = 0.28;
 
-// Composed stands.
+// Properties of composed stands.
 constexpr double kStandKneeRad = 0.2;  // Bend of the straighter knee.
 constexpr double kMinStandWidthM = 0.16;
 constexpr double kMaxStandWidthM = 0.24;
@@ -71,7 +71,8 @@ class StandAverage {
 
 bool IsCapturedStep(const RawGroup& group) { return IsStep(group.kind) && !group.is_completed; }
 
-// Calls use(point, sample) twice per keytime interval of every example of a group of steps.
+// Calls use(point, sample) for the postures of all steps of a group: at the start and the middle of
+// each keytime interval, and at the end of the step. `point` is an index as in StrideModel::points.
 template <class Use>
 void ForEachSample(const Skeleton& skeleton, const RawGroup& group, const Use& use) {
   for (const RawExample& example : group.examples) {

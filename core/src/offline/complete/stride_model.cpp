@@ -66,8 +66,9 @@ bool IsStraightStride(const Stride& stride, Foot moving) {
          std::fabs(stride.example->heading_change_rad) < kMaxTurnRad;
 }
 
-// Returns the straight strides in which a foot moves, from the first group that contains any.
-// Groups of straight steps come first.
+// Returns the straight strides in which foot `moving` moves, from the first captured group that
+// contains any. Groups of straight steps come first. Omits steps over obstacles, and strides whose
+// length differs from the median by more than kSameLengthM.
 std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
   for (const RawGroup& group : library.groups) {
     if (group.is_completed || group.kind != StepKind(moving)) continue;

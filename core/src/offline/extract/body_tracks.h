@@ -25,8 +25,8 @@ struct BodyTracks {
   /// Unwrapped yaw of the pelvis; positive is left. The direction from the right to the left hip
   /// joint is 90 degrees to the left of it.
   std::vector<double> pelvis_yaw_rad;
-  /// Mean position of the joints that belong to neither leg, weighted by bone length. Empty if
-  /// there are none.
+  /// Mean position of all joints except the root and the joints of the legs, weighted by bone
+  /// length. Empty if there are none.
   std::vector<DVec3> trunk_m;
   double leg_length_m = 0.9;  ///< Length of thigh plus shank, averaged over both legs.
 

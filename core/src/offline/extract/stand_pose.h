@@ -8,9 +8,9 @@
 
 namespace stridewire {
 
-/// Returns the stillest moment of a clip in which both feet are side by side on the same ground and
-/// the legs are straight. `heading_rad` is the stride heading per frame of the tracks. Returns
-/// nullopt if both feet never stand.
+/// Returns the pose of a clip that is closest to standing still and upright with flat feet side by
+/// side. `heading_rad` is the stride heading per frame of the tracks. Returns nullopt if both feet
+/// never stand on the same ground at the same time.
 [[nodiscard]] std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip& clip,
                                                          const BodyTracks& tracks,
                                                          const FootContacts& contacts,
