@@ -72,8 +72,8 @@ std::optional<double> RequestedSpeed(const WalkRecord& record,
   return walk != nullptr ? walk->speed_m_s : std::nullopt;
 }
 
-// States which speeds are possible if the library cannot walk at the requested one; otherwise
-// empty.
+// Returns a note on the possible speeds if the library cannot walk at the requested one. Otherwise,
+// returns an empty string.
 std::string SpeedNote(const WalkSpeeds& speeds, const std::optional<double>& requested_m_s) {
   if (!requested_m_s || !speeds.IsOutside(*requested_m_s)) return {};
   char text[100];

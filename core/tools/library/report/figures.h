@@ -36,9 +36,7 @@ struct FigureAxes {
 // Returns the beginning of a group's file names, for example "0_step_left_".
 [[nodiscard]] std::string FilePrefix(const MotionLibrary& library, int group_index);
 
-// Maps the error over parameter space before and after refinement, in one colour scale (paper,
-// Figure 1 left and middle). Both libraries must have the same groups. The maps must have been
-// measured with MapOptions(axes).
+// Both libraries must have the same groups. The maps must have been measured with MapOptions(axes).
 struct ErrorFigureInput {
   const MotionLibrary& before;
   const MotionLibrary& after;
@@ -48,6 +46,8 @@ struct ErrorFigureInput {
   const ErrorMap& map_after;
 };
 [[nodiscard]] ErrorMapOptions MapOptions(const FigureAxes& axes);
+// Maps the error over parameter space before and after refinement, in one colour scale (paper,
+// Figure 1 left and middle).
 [[nodiscard]] Figure ErrorFigure(const ErrorFigureInput& input);
 
 // Plots the largest error against the number of pseudoexamples for both refinement rules (paper,

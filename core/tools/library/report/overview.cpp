@@ -62,7 +62,7 @@ const char* VerdictText(CheckVerdict verdict) {
   return "not applicable";
 }
 
-// Returns a figure with a suitable precision for its unit.
+// Formats a measured value with a precision that suits its unit.
 std::string FigureText(double value, const std::string& unit) {
   return Text(unit == "m" ? "%.3f " : "%.0f ", value) + unit;
 }

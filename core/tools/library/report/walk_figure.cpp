@@ -14,9 +14,10 @@ namespace {
 constexpr double kFps = 60.0;
 constexpr double kPoseSpacingM = 0.3;
 constexpr double kMaxPixelsPerMetre = 220.0;
-constexpr double kSlabM = 0.3;  // Length of a drawn slab.
+constexpr double kSlabM = 0.3;  // Length of the mark at a requested position.
 
-// The requested position of a step, relative to the foot beside it.
+// A mark at the position where a step was requested to land, in world coordinates. The requested
+// distance is measured from the place where the fixed foot stands.
 struct Slab {
   DVec3 centre_m = DVec3(0.0);
   double heading_rad = 0.0;
