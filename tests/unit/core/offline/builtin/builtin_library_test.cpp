@@ -59,8 +59,8 @@ struct Figure {
     return Point(leg.ball, leg.toe_tip_offset_m);
   }
 
-  // Sagittal angles in degrees: hip flexion relative to the pelvis, knee flexion, ankle
-  // dorsiflexion.
+  // Angles in the sagittal plane in degrees. Hip is the flexion relative to the pelvis, Knee the
+  // flexion, and Ankle the dorsiflexion.
   [[nodiscard]] double FootPitch(Foot foot) const {
     const DQuat& q = rotations[static_cast<std::size_t>(Library().skeleton.leg(foot).ankle)];
     const DVec3 ahead = q * DVec3(0.0, 0.0, 1.0);
@@ -344,9 +344,9 @@ TEST(BuiltinLibrary, RightStepsMirrorLeftSteps) {
   }
 }
 
-// Normal sagittal angles of walking in degrees, by percent of the cycle since heel-strike:
-// hip flexion, knee flexion, ankle dorsiflexion. Rounded textbook figures after Winter,
-// Biomechanics and Motor Control of Human Movement, and Perry and Burnfield, Gait Analysis (+-5).
+// Normal sagittal angles of walking in degrees, by percent of the cycle since heel-strike: hip
+// flexion, knee flexion, ankle dorsiflexion. Rounded values, accurate within 5 degrees, from
+// Winter, Biomechanics and Motor Control of Human Movement, and Perry and Burnfield, Gait Analysis.
 constexpr double kNormalAngles[][4] = {
     {0, 22, 4, 0},     {12, 18, 18, -4}, {30, 3, 10, 6},  {40, -6, 6, 9},  {50, -11, 11, 7},
     {62, -6, 38, -18}, {72, 9, 63, -8},  {80, 19, 53, 0}, {90, 23, 20, 1}, {97, 22, 2, 0}};

@@ -192,7 +192,8 @@ TEST(GeneralSteps, ClearStairs) {
     if (end_y < 0) continue;
     const Foot moving = MovingFoot(group->kind), fixed = OtherFoot(moving);
     for (const RawExample& example : group->examples) {
-      if (example.heading_change_rad != 0.0) continue;  // Their stairs are not parallel to z.
+      if (example.heading_change_rad != 0.0)
+        continue;  // The stairs of a turn are not parallel to z.
       SCOPED_TRACE(example.source);
       const auto ball = [&](int frame, Foot foot) {
         legs.Set(example.clip.frame(frame));

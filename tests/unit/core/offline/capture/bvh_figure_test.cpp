@@ -1,4 +1,4 @@
-// What the reader makes of figures from different programs: their root, legs, axes and positions.
+// How the reader interprets figures from different programs: their root, legs, axes and positions.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,7 +21,8 @@ using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
 
-// A figure in centimetres with y up whose BVH text is written with a motion of its own.
+// A figure in centimetres with y up. Text() returns it as a BVH file with the motions that
+// Animate() has set.
 class Figure {
  public:
   struct Local {

@@ -734,43 +734,43 @@ std::vector<std::string> SmallFile() {
           "JOINT LeftUpLeg",
           "{",
           "OFFSET 0.1 0 0",
-          "CHANNELS 1 Xrotation",  // 6
+          "CHANNELS 1 Xrotation",  // 9
           "JOINT LeftLeg",
           "{",
-          "OFFSET 0 -0.4 0",  // 10
+          "OFFSET 0 -0.4 0",  // 12
           "JOINT LeftFoot",
           "{",
-          "OFFSET 0 -0.4 0",  // 13
+          "OFFSET 0 -0.4 0",  // 15
           "End Site",
           "{",
           "OFFSET 0 0 0.2",
-          "}",  // 16
+          "}",  // 19
           "}",
           "}",
-          "}",  // 20
+          "}",  // 22
           "JOINT RightUpLeg",
           "{",
-          "OFFSET -0.1 0 0",  // 23
+          "OFFSET -0.1 0 0",  // 25
           "JOINT RightLeg",
           "{",
-          "OFFSET 0 -0.4 0",  // 26
+          "OFFSET 0 -0.4 0",  // 28
           "JOINT RightFoot",
           "{",
-          "OFFSET 0 -0.4 0",  // 29
+          "OFFSET 0 -0.4 0",  // 31
           "End Site",
           "{",
           "OFFSET 0 0 0.2",
-          "}",  // 32
+          "}",  // 35
           "}",
           "}",
           "}",
-          "}",  // 36
+          "}",  // 39
           "MOTION",
           "Frames: 3",
-          "Frame Time: 0.05",  // 40
+          "Frame Time: 0.05",  // 42
           "0 0.8 0 1 2 3 4",
           "0 0.8 0 1 2 3 4",
-          "0 0.8 0 1 2 3 4"};  // 43
+          "0 0.8 0 1 2 3 4"};  // 45
 }
 
 std::string Joined(const std::vector<std::string>& lines) {
@@ -910,7 +910,7 @@ TEST(ParseBvh, EnforcesItsLimits) {
   EXPECT_THAT(fault("HIERARCHY\nROOT " + std::string(300, 'n') + "\n{"),
               HasSubstr("name is longer than"));
 
-  // 256 joints and two bytes per frame reach the limit of rotations.
+  // With 256 joints, rows of two bytes reach the limit of rotations.
   std::string rows = chain(kMaxJoints, false);
   rows.replace(rows.find("Frames: 1"), 9, "Frames: 9999999");
   for (std::int64_t i = 0; i < kMaxBvhRotations / kMaxJoints + 10; ++i) rows += "0\n";

@@ -34,7 +34,7 @@ class RemoveRootNoise : public testing::Test {
     }
     return sum / (clip.frame_count() - 2);
   }
-  // Moves and rotates the root from frame to frame. The legs do not compensate it.
+  // Adds a random displacement and rotation to the root in each frame. The legs move with the root.
   void Shake(double deviation_m, double deviation_rad) {
     std::normal_distribution<float> metres(0.0f, static_cast<float>(deviation_m));
     std::normal_distribution<float> radians(0.0f, static_cast<float>(deviation_rad));

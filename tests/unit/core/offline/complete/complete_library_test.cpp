@@ -129,7 +129,7 @@ TEST(CompleteLibrary, StepsAreWellFormed) {
   }
 }
 
-// Frame by frame, joints turn no faster than people's do.
+// From frame to frame, no joint rotates faster than 12 rad/s, as in motions of people.
 TEST(CompleteLibrary, StepsAreSmooth) {
   const RawLibrary library = Completed(WalkWithoutStop());
   for (const RawGroup* group : CompletedGroups(library)) {

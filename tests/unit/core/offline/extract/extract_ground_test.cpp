@@ -97,7 +97,8 @@ TEST(ExtractGround, ExamplesOfAnInclinedFloorStandOnLevelGround) {
   }
 }
 
-// Level walking and a climb of 80 cm in one capture: neither sinks.
+// In a capture with level steps and a climb of 80 cm, the fixed foot of every step is on the
+// ground.
 TEST(ExtractGround, LevelStepsStayOnTheGroundBesideAClimb) {
   std::vector<WalkerStep> steps;
   for (int i = 0; i < 16; ++i) {
@@ -134,7 +135,7 @@ TEST(ExtractGround, LeavesOutAStillPoseThatJumpsToTheMotion) {
   }
 }
 
-// A capture that starts 20 cm too low and blends to the motion does not hang on anything.
+// A figure that starts 20 cm too low and then rises to the height of the motion does not hang.
 TEST(ExtractGround, FindsAllStepsAfterABlendedStart) {
   Capture capture = SyntheticWalker().Walk(WalkWithRise(0.0));
   for (int f = 0; f < 48; ++f) {

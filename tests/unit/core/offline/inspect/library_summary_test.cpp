@@ -25,7 +25,7 @@ std::shared_ptr<const MotionLibrary> Build(const RawLibrary& raw) {
   return *library;
 }
 
-// Returns the test library with a source of its own for each example.
+// Returns the test library with a different source for each example of a group.
 RawLibrary Walker() {
   RawLibrary raw = MakeTestRawLibrary();
   for (RawGroup& group : raw.groups) {

@@ -99,8 +99,8 @@ TEST(SelfCheck, JsonContainsEveryCheck) {
   }
 }
 
-// Bends both knees of the stand pose by 60 degrees about the axis of the figure that points to its
-// left, with the thigh turned by half of that.
+// Returns one frame: the stand pose with both knees bent by `knee_rad` about the axis that points
+// to the left of the figure. Each thigh turns by half of that in the opposite direction.
 Synthesis StandWithBentKnees(const MotionLibrary& library, float knee_rad) {
   Pose pose = library.stand_pose();
   const auto turn = [](float angle) {

@@ -56,8 +56,8 @@ TEST(BlendKeytimes, ReproducesTheKeytimesOfAnExample) {
 }
 
 TEST(BlendKeytimes, StaysIncreasingUnderNegativeWeights) {
-  // Random keytimes and weights far outside the hull, for which sum w K alone decreases (by 45 ms
-  // in the paper's method).
+  // Random keytimes and weights far outside the hull. Their weighted sum alone, as in the paper,
+  // would often decrease from one keytime to the next.
   const unsigned seed = 20261;
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> length(0.03, 0.6);
