@@ -14,7 +14,7 @@ export interface QualityLevel {
   readonly coarse: boolean;
   /** No shadow blobs beneath the feet, and stick figures with half as many lines. */
   readonly simplified: boolean;
-  /** Upper limit of footprints drawn. */
+  /** Maximum number of footprints drawn. */
   readonly maxFootprints: number;
 }
 

@@ -29,7 +29,7 @@ void main() {
 /** A ring buffer of footprints: new ones replace the oldest. */
 export class Footprints {
   readonly decals: GroundDecals;
-  /** Upper limit of footprints, at most the capacity. */
+  /** Maximum number of footprints drawn, at most the capacity. */
   limit: number;
   private next = 0;
   private total = 0;

@@ -48,7 +48,7 @@ export interface ViewOptions {
   coarse: boolean;
   shadows: boolean;
   simplified: boolean;
-  /** Upper limit of footprints drawn. */
+  /** Maximum number of footprints drawn. */
   maxFootprints: number;
   footprints: boolean;
   plantedFeet: boolean;
@@ -56,7 +56,7 @@ export interface ViewOptions {
   readonly software: boolean;
 }
 
-/** A decal of a walk: its goal, a waypoint, or the heading at the goal, fixed or being dragged. */
+/** A marker on the ground for a walk: its goal, a waypoint, or the heading at the goal. */
 export interface GoalDecal {
   readonly kind: keyof typeof goalDecalKinds;
   readonly atM: readonly [number, number, number];
