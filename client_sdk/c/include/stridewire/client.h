@@ -705,9 +705,10 @@ typedef struct stridewire_playout {
   double worst_jitter_s;     ///< Largest lateness of the last 4 s.
   double newest_age_s;       ///< Server time that has passed since the newest pose message.
   uint64_t displayed_poses;  ///< Number of sampled poses.
-  /// Number of poses that were sampled after the newest pose, while the motion still continued.
+  /// Number of poses that were sampled after the newest pose and extrapolated from it. The motion
+  /// slows down and stops within 0.25 s.
   uint64_t extrapolated_poses;
-  /// Number of poses that were sampled after the newest pose, when the motion had stopped.
+  /// Number of poses that were sampled after the extrapolated motion had stopped.
   uint64_t held_poses;
   uint64_t jumps;  ///< Jumps of the render time within a session.
 } stridewire_playout;
