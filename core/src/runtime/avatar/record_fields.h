@@ -30,7 +30,7 @@ enum Flag : std::uint16_t {
   // speed of the previous one.
   kKeepsSpeed = 1 << 9,
   // Flags for a movement that began:
-  kIsEntered = 1 << 10,  // The movement began at a time later than 0.
+  kIsEntered = 1 << 10,  // The record contains Movement::start_offset_s, which is not 0.
   kIsSteered = 1 << 11,  // The record contains LandingDecision::extra_turn_rad.
   kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; the record contains lift_m and normal.
   kMidSwingOffset = 1 << 13,  // The record contains LandingDecision::mid_swing_offset_m.
