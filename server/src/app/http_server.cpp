@@ -115,7 +115,7 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     if (request.count(http::field::origin) > 0) origin = View(request[http::field::origin]);
     if (!server_.stream_->policy.Allows(origin, View(request[http::field::host]))) {
       server_.metrics_.origins_refused.Add();
-      spdlog::info("refused a stream to a page of origin {:.200}", *origin);
+      spdlog::info("refused a WebSocket: the origin {:.200} of the page is not allowed", *origin);
       return HttpAnswer{
           .status = 403,
           .body =

@@ -120,7 +120,7 @@ class Shard : public SessionHost {
   // Scratch memory of the libraries in use.
   std::map<const MotionLibrary*, std::weak_ptr<PoseScratch>> scratch_;
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
-  InterestTracker interests_;  // of sessions_
+  InterestTracker interests_;  // Combined interests of sessions_.
   protocol::Encoder encoder_;
   protocol::PoseBatchComposer composer_;
   std::map<int, ShardOutbox> outboxes_;  // Outboxes by receiving shard; only those with contents.

@@ -92,6 +92,14 @@ Expected<CommandLine> ReadCommandLine(int argc, const char* const* argv,
     result.action = CommandLine::Action::kPrintText;
     result.text = std::string("stridewired ") + kVersion + "\n";
     return result;
+  } catch (const CLI::ExtrasError&) {
+    // The text of the exception lists the arguments in reverse order.
+    return Fail(ErrorCode::kInvalidArgument, "unknown option or surplus argument; see --help",
+                app.remaining().front());
+  } catch (const CLI::ArgumentMismatch& error) {
+    const std::string text = error.what();  // "--tick-hz: 1 required  missing"
+    return Fail(ErrorCode::kInvalidArgument, "expected a value; see --help",
+                text.substr(0, text.find(':')));
   } catch (const CLI::ParseError& error) {
     return Fail(ErrorCode::kInvalidArgument, "see --help", std::string(error.what()));
   }

@@ -205,7 +205,7 @@ std::vector<ConfigKey> MakeKeys() {
       Number("shards", "Threads that advance avatars; 0: one per processor", &Config::shards, 0,
              kMaxShards),
       Number("max_catch_up_ticks",
-             "Missed ticks that avatars catch up on; time beyond them is lost",
+             "Maximum number of missed ticks that avatars catch up on; further ones are lost",
              &Config::max_catch_up_ticks, 0, 1000),
       Flag("run_time_correction",
            "Correct blend weights so that movements meet the requested parameters",

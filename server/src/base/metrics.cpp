@@ -174,9 +174,12 @@ std::string Metrics::Text() {
           &ThreadMetrics::bytes_received);
   counter("stridewire_messages_received_total", "Messages received from clients.",
           &ThreadMetrics::messages_received);
-  counter("stridewire_requests_accepted_total", "Requests accepted and queued.",
+  counter("stridewire_requests_accepted_total",
+          "Accepted items of Request, SetLayers and SetPlanting.",
           &ThreadMetrics::requests_accepted);
-  counter("stridewire_requests_rejected_total", "Requests rejected.",
+  counter("stridewire_requests_rejected_total",
+          "Rejected items of Request, SetLayers and SetPlanting, and of any command beyond "
+          "requests_per_s.",
           &ThreadMetrics::requests_rejected);
   counter("stridewire_protocol_errors_total",
           "Connections closed because of invalid or unexpected messages.",

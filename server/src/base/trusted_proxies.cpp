@@ -9,7 +9,7 @@ namespace {
 
 namespace ip = boost::asio::ip;
 
-constexpr int kMappedBits = 96;  // Length of the prefix of IPv4 addresses in IPv6.
+constexpr int kMappedBits = 96;  // Length of ::ffff:0:0/96, the prefix of mapped addresses.
 
 std::optional<ip::address> ParseAddress(std::string_view text) {
   boost::system::error_code error;

@@ -15,7 +15,7 @@ using boost::system::error_code;
 
 constexpr std::size_t kReadBufferBytes = std::size_t{32} << 10;
 constexpr std::size_t kWriteBytes = std::size_t{256} << 10;
-// A silent peer is pinged this often before it counts as idle.
+// Number of pings that a silent peer receives within the idle timeout.
 constexpr double kPingsPerIdleTimeout = 3.0;
 
 }  // namespace
@@ -283,7 +283,8 @@ void Connection::BeginLinger() {
 
 void Connection::Close() {
   if (is_closed_) return;
-  const auto self = shared_from_this();  // Close may end the last operation that keeps it alive.
+  // Close may end the last operation that keeps this object alive.
+  const auto self = shared_from_this();
   is_closed_ = true;
   timer_.cancel();
   transport_->Close();

@@ -99,8 +99,8 @@ class Transport {
   [[nodiscard]] virtual bool Send(std::shared_ptr<User> user,
                                   std::span<const SharedFrame> frames) = 0;
 
-  /// Sends a ping, if the transport has pings. The peer's transport answers it without the program,
-  /// and the answer counts as received bytes.
+  /// Sends a ping, if the transport has pings. The WebSocket implementation of the peer answers it,
+  /// not its application. The answer counts as received bytes.
   virtual void KeepAlive(std::shared_ptr<User> user) = 0;
 
   /// Closes the sending direction after the last Send. The user continues to receive until the peer

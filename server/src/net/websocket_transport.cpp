@@ -80,7 +80,7 @@ class WebSocketTransport final : public Transport {
   }
 
   // Browsers slow down the timers of hidden pages, so such a page may send nothing for a minute.
-  // The browser itself answers a ping.
+  // The browser itself answers a ping, which proves that the page still exists.
   void KeepAlive(std::shared_ptr<User> user) override {
     if (request_ || is_pinging_) return;
     is_pinging_ = true;

@@ -38,7 +38,7 @@ class MovementFeed {
   /// as gone until the message has `max_bytes`. The others are reported with the next step.
   [[nodiscard]] protocol::Movements Select(const protocol::Movements& step, std::size_t max_bytes);
 
-  /// Movements were dropped, so the client has no valid avatars.
+  /// Must be called when movements were dropped: the client's avatars are then invalid.
   void SetLost();
   [[nodiscard]] bool is_lost() const { return is_lost_; }
   /// Continues a lost feed. All avatars need states.

@@ -69,7 +69,7 @@ class RegionMembers {
     protocol::PoseRows::Avatars avatars;  // All avatars of the shard.
     std::vector<bool> is_member;          // [row of `avatars`]: true for members.
   };
-  /// The parts of a delivery that an update needs.
+  /// The parts of a PoseDelivery or MovementDelivery that Update uses.
   struct Snapshot {
     int from_shard;
     std::uint64_t tick;

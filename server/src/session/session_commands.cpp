@@ -81,10 +81,9 @@ bool SessionCommands::Begin(Seq seq) {
       return false;
     }
     case ReplyCache::Verdict::kForgotten:
-      context_.Send(
-          Reply{.seq = seq,
-                .code = StatusCode::kForgotten,
-                .text = "the command was executed, but its reply is not stored any more"});
+      context_.Send(Reply{.seq = seq,
+                          .code = StatusCode::kForgotten,
+                          .text = "the command was executed, but its reply is no longer stored"});
       return false;
   }
   return false;
@@ -315,7 +314,7 @@ void SessionCommands::Execute(protocol::Spawn&& command) {
       if (item.avatar != 0) {
         submit();
       } else {
-        refuse("a teleport needs the id of an avatar", StatusCode::kNoSuchAvatar);
+        refuse("a teleport requires an avatar id above 0", StatusCode::kNoSuchAvatar);
       }
       ++index;
       continue;
@@ -351,7 +350,7 @@ void SessionCommands::Execute(protocol::Spawn&& command) {
 void SessionCommands::Execute(protocol::Request&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
-  // Counts the avatars, assuming that the requests of an avatar follow each other.
+  // Counts the avatars, assuming that the requests of each avatar are consecutive.
   std::size_t avatars = 0;
   for (std::size_t i = 0; i < command.items.size(); ++i) {
     avatars += i == 0 || command.items[i].avatar != command.items[i - 1].avatar;
@@ -394,8 +393,8 @@ void SessionCommands::Execute(protocol::SetPlanting&& command) {
 void SessionCommands::Execute(protocol::SetTerrain&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr) return;
-  // Heights and boxes of the terrain. They determine the cost of validating and sending it, which
-  // is counted in items.
+  // Number of heights and boxes. It determines the cost of validating and sending the terrain, and
+  // therefore how many items the command counts as.
   std::size_t numbers = 0;
   if (command.terrain) {
     numbers = command.terrain->boxes.size();

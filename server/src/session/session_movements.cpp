@@ -12,7 +12,7 @@ using protocol::PoseMode;
 
 namespace {
 
-// Size of the states that one request to a shard asks for.
+// Size of the states that one request to a shard requests.
 constexpr std::size_t kStatesBytes = 100'000;
 
 }  // namespace
@@ -104,7 +104,7 @@ void SessionStream::OnMovements(SharedMovements& movements) {
                                            : EncodeFrame(context_.host.encoder(), selected));
   }
   RegionMembers* region = subscriptions_.FindRegion(delivery.world, PoseMode::kMovement);
-  // The grid is null if the shard does not know yet that there is a region.
+  // The grid is null until the shard has received the region.
   if (region != nullptr && delivery.grid != nullptr) {
     const RegionMembers::Change change = region->Update(delivery);
     if (!change.entered.empty() || !change.left.empty()) {

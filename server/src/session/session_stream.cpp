@@ -131,7 +131,7 @@ void SessionStream::OnPoses(SharedPoses& poses) {
   switch (subscriptions_.ShareOf(delivery)) {
     case Subscriptions::Share::kNone: return;
     case Subscriptions::Share::kAll:
-      // Empty if the shard does not know yet that complete batches are needed.
+      // Empty until the shard has received the request for complete batches.
       if (!delivery.parts.empty()) SendPoses(delivery, delivery.parts);
       return;
     case Subscriptions::Share::kSubset:
@@ -141,7 +141,7 @@ void SessionStream::OnPoses(SharedPoses& poses) {
       }
       return;
     case Subscriptions::Share::kRegion:
-      // Null if the shard does not know yet that there is a region.
+      // Null until the shard has received the region.
       if (delivery.grid == nullptr) return;
       const RegionMembers::Change change = subscriptions_.UpdateRegion(delivery);
       SendRegionChange(delivery.world, delivery.tick, change);

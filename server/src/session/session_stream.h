@@ -116,8 +116,8 @@ class SessionStream {
   /// Sends `frames`, which contain poses of `delivery`.
   void SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames);
   void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
-  /// Numbers and sends a message. While the client is away, stores it instead. Returns how many
-  /// events were dropped.
+  /// Numbers and sends a message. While the client is not connected, stores it instead. Returns how
+  /// many events were dropped.
   std::uint64_t SendEvents(protocol::Events&& message);
   void CountDroppedEvents(WorldId world, std::uint64_t events);
   void CountDroppedBatches(WorldId world, std::uint64_t batches);

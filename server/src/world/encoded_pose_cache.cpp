@@ -276,7 +276,8 @@ EncodedPoseCache::Encoded EncodedPoseCache::Find(const Slot& slot, PoseMode mode
   std::size_t m = 0;
   while (m < modes_.size() && modes_[m].mode != mode) ++m;
   STRIDEWIRE_CHECK(m < modes_.size() && pose < state.count);
-  // Slots are read in order, but the hardware prefetcher stops at the end of each page.
+  // Slots are read in order, but the hardware prefetcher stops at the end of each page, so poses
+  // are prefetched this many slots ahead.
   constexpr std::size_t kSlotsAhead = 8;
   if (const std::size_t next = slot.index_ + kSlotsAhead; next < slots_.size()) {
     PrefetchBytes(BytesIn(plane_, next) + modes_[m].offset, modes_[m].codec->pose_bytes());

@@ -124,7 +124,7 @@ struct StatesRequest {
 };
 struct StatesResult {
   WorldId world = 0;
-  int from_shard = 0;  ///< The shard of the avatars.
+  int from_shard = 0;  ///< Shard that owns the avatars and sends this result.
   SessionId session = 0;
   std::uint32_t nonce = 0;
   AvatarId next = 0;  ///< `first` of the next request; 0: no avatars are left.

@@ -46,7 +46,7 @@ struct WorldShardDef {
 /// The avatars of one world on one shard. It has no sockets and no threads; time is an argument,
 /// and the caller fetches results. Not thread-safe.
 ///
-/// An avatar takes about 8 KB plus its queue (docs/SERVER.md, "Memory").
+/// docs/SERVER.md, "Memory and capacity", states the memory of an avatar.
 class WorldShard {
  public:
   explicit WorldShard(WorldShardDef def);

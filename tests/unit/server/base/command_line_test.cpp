@@ -106,6 +106,9 @@ TEST(CommandLine, RejectsUnknownArguments) {
     ASSERT_FALSE(read) << arguments[0];
     EXPECT_THAT(Describe(read.error()), HasSubstr(arguments[0]));
   }
+  EXPECT_EQ(Describe(Read({"--tick-hz", "30", "--bar", "7"}).error()),
+            "--bar: unknown option or surplus argument; see --help");
+  EXPECT_EQ(Describe(Read({"--tick-hz"}).error()), "--tick-hz: expected a value; see --help");
 }
 
 TEST(CommandLine, FileErrorsContainTheFileName) {
