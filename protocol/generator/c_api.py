@@ -27,7 +27,7 @@ class CApi(Cpp):
                 if name in f.get("only", "").split()]
 
     def conditions(self, table):
-        """What a struct must fulfil. The checks of the message do the rest."""
+        """Conditions on the C struct that the checks of the message do not include."""
         lines = []
         for f in table.fields:
             used = " || ".join(self.is_type(f))

@@ -32,7 +32,7 @@ class Cpp:
     def type_name(self, type_name):
         """The C++ type of the message structs for a table, struct or enum."""
         declared = self.schema.tables.get(type_name) or self.schema.enums.get(type_name)
-        if declared is None:  # An alternative.
+        if declared is None:  # An alternative of a variant is not declared in the schema.
             return type_name
         return declared.attributes.get("native") or declared.attributes.get("cpp") or type_name
 
@@ -378,7 +378,7 @@ class Cpp:
             lines.append(f"  static constexpr MessageType kType = MessageType::k{table.name};")
         if "variant" in table:
             return "\n".join(lines + self.variant_members(table)) + "\n"
-        groups = {}  # Members that several fields share, and how many: legs[0], legs[1].
+        groups = {}  # Name of a member: number of its fields, for example legs[0] and legs[1].
         for f in table.fields:
             name = re.split(r"[.\[]", f.get("cpp", f.name))[0]
             groups[name] = groups.get(name, 0) + 1

@@ -7,7 +7,7 @@ KIND is one of:
   json    fields_json.h and fields_json.cpp, for the test vectors
   web     messages.ts and tables.ts for the web client, and json.ts for its tests
 
-Files that would not change are left alone, so that nothing is compiled again.
+Files whose content does not change are not written, so that nothing is compiled again.
 """
 
 import pathlib

@@ -84,7 +84,7 @@ class Schema:
         self.path = path
         self.enums = {}
         self.tables = {}
-        self.limits = {}  # Name of a limit: its Field.
+        self.limits = {}  # Name of a limit: the Field that declares it.
         self._parse(text)
         if "Limits" in self.tables:
             self.limits = {f.name: f for f in self.tables.pop("Limits").all_fields}
@@ -134,7 +134,7 @@ class Schema:
         return tables
 
     def _used_by(self, f, value, names):
-        """The field as the value uses it: without conditions on fields that it does not use."""
+        """Copies a field without the conditions that cannot apply for this value of `type`."""
         needed = value in f.get("needed", "").split()
         attributes = {name: text for name, text in f.attributes.items()
                       if not (needed and name in ("json_omit", "optional", "with", "without"))

@@ -25,16 +25,16 @@ class TypeScript:
     # ---- names and types
 
     def name_of(self, f):
-        """The C++ name of a member also serves here, unless it is a path."""
+        """The name of a field in TypeScript: that of the C++ member, unless that is a path."""
         cpp = f.get("cpp", "")
         return f.get("web") or lower_camel(cpp if cpp.isidentifier() else f.name)
 
     def is_tuple(self, table):
-        """A vector or quaternion is an array."""
+        """True for vectors and quaternions, which are arrays in TypeScript."""
         return table.is_struct and all(f.name in "xyzw" for f in table.fields)
 
     def only_member(self, table):
-        """The member that stands for the whole table: a layer is its name."""
+        """The member that stands for the whole table, or None. For example, a layer is its name."""
         return next((f for f in table.fields if f.get("cpp") == "."), None)
 
     def type_of(self, f):
@@ -125,7 +125,7 @@ class TypeScript:
             info["initial"] = self.schema.enums[f.type].values.get(f.default, 0)
         elif f.type not in self.schema.tables and f.type != "string":
             info["initial"] = None if f.default == "null" else float(f.default or 0)
-        # The schema states a default for what may be absent.
+        # generator/README.md lists the cases in which a property may be absent.
         if f.default or "only" in f or "optional" in f or (f.is_list and "min" not in f) or (
                 f.type == "bool" and "inverted" not in f):
             info["absent"] = True

@@ -120,7 +120,7 @@ void CheckMeaning(Findings& found, const FieldPath& at, const WorldInfo& m) {
   const FieldPath codes = At(at, "rotation_quantizations");
   found.That(m.rotation_quantizations.empty() ||
                  m.rotation_quantizations.size() == m.skeleton.joints.size(),
-             codes, m.rotation_quantizations.size(), "expected one code per joint",
+             codes, m.rotation_quantizations.size(), "expected one quantization per joint",
              ErrorCode::kShapeMismatch);
   if (const Status status = CheckRotationQuantizations(m.rotation_quantizations); !status) {
     found.Wrong(status.error().code, status.error().text, codes, status.error().index);

@@ -133,7 +133,7 @@ Status CheckRotationQuantizations(std::span<const RotationQuantization> codes) {
     return Fail(code, text, static_cast<std::int64_t>(joint));
   };
   if (codes.size() > kMaxJoints) {
-    return wrong(ErrorCode::kLimitExceeded, "too many rotation codes", codes.size());
+    return wrong(ErrorCode::kLimitExceeded, "too many rotation quantizations", codes.size());
   }
   for (std::size_t j = 0; j < codes.size(); ++j) {
     const RotationQuantization& code = codes[j];
@@ -200,7 +200,7 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationQuantization> 
   }
   if (codes.empty() || codes.size() != parents.size()) {
     return std::unexpected(Error{ErrorCode::kShapeMismatch,
-                                 "the number of rotation codes is not the number of joints",
+                                 "the number of rotation quantizations is not the number of joints",
                                  static_cast<std::int64_t>(codes.size())});
   }
   if (!included.empty()) {

@@ -117,7 +117,7 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
       hn::StoreU(hn::BitCast(DU(), RootSteps(hn::IfThenElseZero(fits, metres))), DU(),
                  work.numbers + c * kBlock + lane);
     }
-    // Becomes nonzero in lanes where a number needs more bits than its code has.
+    // Becomes nonzero in lanes where a number needs more bits than its quantization has.
     VI excess = hn::Zero(di);
     for (const std::size_t j : plan.order) {
       const CompactJoint& joint = plan.joints[j];

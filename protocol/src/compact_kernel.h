@@ -29,7 +29,7 @@ struct CompactWork {
   float* errors;           // [joint][x y z][pose]
   std::uint32_t* numbers;  // [CompactPart::row][pose]
   std::uint32_t* words;    // [word / 4][pose][word % 4]
-  std::uint32_t* fits;     // [pose]: 1 if the pose fits the codes, otherwise 0.
+  std::uint32_t* fits;     // [pose]: 1 if all rotations are in range, otherwise 0.
 };
 
 /// Encodes a block. The bytes do not depend on the vector width of the machine.

@@ -58,7 +58,7 @@ Expected<Message> DecodeMessage(const FrameView& frame) {
     return Fail(ErrorCode::kInvalidArgument, "the payload is not aligned to 8 bytes");
   }
   if (frame.payload.size() > MaxPayloadBytes(frame.type)) {
-    return Fail(ErrorCode::kLimitExceeded, "the payload exceeds the cap of its type",
+    return Fail(ErrorCode::kLimitExceeded, "the payload exceeds the limit of its message type",
                 std::string(MessageTypeName(frame.type)),
                 static_cast<std::int64_t>(frame.payload.size()));
   }

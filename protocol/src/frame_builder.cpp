@@ -14,7 +14,7 @@ Status BeginFrame(std::size_t size, MessageType type, const FrameLimits& limits,
                   std::vector<std::byte>& frame) {
   const std::size_t padding = PaddingOf(size);
   if (size + padding > MaxPayloadBytes(type, limits)) {
-    return Fail(ErrorCode::kLimitExceeded, "the payload exceeds the cap of its type",
+    return Fail(ErrorCode::kLimitExceeded, "the payload exceeds the limit of its message type",
                 std::string(MessageTypeName(type)), static_cast<std::int64_t>(size + padding));
   }
   std::array<std::byte, kFrameHeaderBytes> header;

@@ -8,7 +8,7 @@
 namespace stridewire::protocol {
 
 /// Appends a header, the finished FlatBuffers message in `builder` and its padding to `frame`.
-/// Fails with kLimitExceeded if the message exceeds the cap of its type, and then leaves `frame`
+/// Fails with kLimitExceeded if the message exceeds the limit of its type, and then leaves `frame`
 /// unchanged.
 [[nodiscard]] Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
                                  const FrameLimits& limits, std::vector<std::byte>& frame);

@@ -11,8 +11,8 @@
 
 namespace stridewire::protocol {
 
-/// Checks the rotation codes of a WorldInfo: references are unit quaternions, numbers are finite
-/// and within the limits of RotationQuantization, and the root uses "smallest three". An empty list
+/// Checks the quantizations of a WorldInfo: references are unit quaternions, numbers are finite and
+/// within the limits of RotationQuantization, and the root uses "smallest three". An empty list
 /// is valid. Fails with kOutOfRange, kMalformed or kLimitExceeded; `index` is the joint.
 [[nodiscard]] Status CheckRotationQuantizations(std::span<const RotationQuantization> codes);
 
@@ -101,7 +101,7 @@ class CompactCodec {
     void Add(const Vec3& root_position_m, std::span<const Quat> rotations);
     /// Gets the i-th pose as it was added.
     void Get(std::size_t i, Vec3& root_position_m, std::span<Quat> rotations) const;
-    /// After Encode: returns whether the pose is inside the range of the rotation codes.
+    /// After Encode: returns whether the pose is inside the range of the quantizations.
     [[nodiscard]] bool fits(std::size_t i) const { return fits_[i] != 0; }
     /// After Encode: copies the pose_bytes() bytes of a pose. They are unspecified unless fits(i).
     void CopyBytes(std::size_t i, std::span<std::byte> out) const;
@@ -132,8 +132,8 @@ class CompactCodec {
   };
 
   /// Encodes the poses of a block, which must have joint_count() joints. A pose does not fit if a
-  /// rotation is outside the range of its code, the root exceeds kMaxRootM, a number is not finite,
-  /// or the length of a quaternion deviates from 1 by more than 1e-5.
+  /// rotation is outside the range of its quantization, the root exceeds kMaxRootM, a number is not
+  /// finite, or the length of a quaternion deviates from 1 by more than 1e-5.
   void Encode(Block& block) const;
   /// Encodes poses of the caller instead, which replace those of the block.
   void Encode(const SoaPoses& poses, Block& block) const;

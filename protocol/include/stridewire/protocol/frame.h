@@ -26,7 +26,7 @@ enum class Sender : std::uint8_t { kClient, kServer };
 /// they can hold data of a whole crowd.
 [[nodiscard]] bool IsBulk(MessageType type);
 
-/// Limits of payload sizes in bytes. The defaults are those of the standard. A program may use
+/// Limits of payload sizes in bytes. The defaults are those of STANDARD.md. A program may use
 /// lower ones.
 struct FrameLimits {
   std::size_t max_control_bytes = kMaxControlBytes;
