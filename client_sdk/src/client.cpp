@@ -70,7 +70,8 @@ stridewire_status stridewire_client_create(const stridewire_client_options* opti
   }
   try {
     SessionOptions s;
-    // Check the options as a Hello message, because the server would reject invalid ones later.
+    // Checks the texts as the fields of a Hello message, because the server would reject invalid
+    // ones later.
     protocol::Hello hello;
     hello.client_name = o.client_name != nullptr ? o.client_name : "";
     hello.auth_token = o.auth_token != nullptr ? o.auth_token : "";
@@ -98,8 +99,8 @@ stridewire_status stridewire_client_create(const stridewire_client_options* opti
     return STRIDEWIRE_OK;
   } catch (const std::bad_alloc&) {
     return STRIDEWIRE_OUT_OF_MEMORY;
-    // The system could not create another thread or file descriptor.
   } catch (const std::exception&) {
+    // The system could not create another thread or file descriptor.
     return STRIDEWIRE_OUT_OF_MEMORY;
   }
 }

@@ -108,7 +108,7 @@ std::optional<std::size_t> PoseHistory::FirstAfterTick(std::uint64_t tick) const
 
 namespace {
 
-/// Weights of cubic Hermite interpolation at u, which is 0 to 1.
+/// Weights of cubic Hermite interpolation at `u`, from 0 to 1.
 struct Hermite {
   explicit Hermite(float u)
       : slope_0(u * (1.0f - u) * (1.0f - u)),

@@ -158,7 +158,7 @@ class SessionState {
   State state_ = State::kIdle;
   stridewire_status last_status_ = STRIDEWIRE_OK;
   std::string last_text_;
-  std::uint64_t answered_command_ = 0;  ///< Session::answered_command
+  std::uint64_t answered_command_ = 0;  ///< Result of Session::answered_command.
   Backoff backoff_;
   EventQueue events_;
   ClockMap clock_;

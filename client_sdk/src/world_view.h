@@ -204,7 +204,7 @@ class WorldView : public PoseSink {
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;
-  /// Last assigned segment. It is never reset, so that poses of different sessions differ.
+  /// Last assigned segment. It is never reset, so that no two sessions use the same segment.
   std::uint32_t last_segment_ = 0;
   std::uint64_t revision_ = 0;
   PoseRecording recording_;

@@ -21,8 +21,8 @@ class PoseSink {
   virtual void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                       ConstPoseSpan pose) = 0;
 
-  /// Called when an avatar was removed, left the subscription, or lost its state because a message
-  /// is missing.
+  /// Called when an avatar is removed or leaves the subscription, or when its state is discarded
+  /// because a message is missing.
   virtual void OnGone(protocol::AvatarId avatar) = 0;
 
   /// The set evaluates only avatars for which this function returns true. If the result changes to

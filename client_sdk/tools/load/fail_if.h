@@ -9,9 +9,8 @@
 
 namespace stridewire::load {
 
-/// A condition on a number of the report, for example `step_latency_ms.p99 >= 50`.
-///
-///   NAME OPERATOR NUMBER      OPERATOR: > >= < <= == !=
+/// A condition on one of the numbers of the report, for example `step_latency_ms.p99 >= 50`. Its
+/// form is NAME OPERATOR NUMBER, where OPERATOR is >, >=, <, <=, == or !=.
 class FailIf {
  public:
   /// Fails with kMalformed. Error::where is then "--fail-if 'TEXT'".

@@ -7,7 +7,7 @@ namespace stridewire::load {
 
 /// Counts times in log-linear bins like HdrHistogram: bins of 1 us up to 255 us, then 128 bins per
 /// octave. Quantiles are rounded up by at most 1/128 (0.8 %). The maximum is exact to 1 us. Takes
-/// 29 KiB and allocates only in its constructor. Not thread-safe: use one per thread and merge
+/// 30 KiB and allocates only in its constructor. Not thread-safe: use one per thread and merge
 /// them.
 class LatencyHistogram {
  public:

@@ -189,6 +189,10 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
   } catch (const CLI::CallForVersion&) {
     line.text = app.version() + "\n";
     return line;
+  } catch (const CLI::ExtrasError&) {
+    // The text of the exception lists the arguments in reverse order.
+    return Fail(ErrorCode::kInvalidArgument, "unknown option or surplus argument; see --help",
+                app.remaining().front());
   } catch (const CLI::ParseError& error) {
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');

@@ -111,7 +111,7 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
     auto codecs =
         protocol::CompactCodecs::Make(info.rotation_quantizations, parents, info.reduced_joints);
     const protocol::CompactCodec* codec = codecs ? codecs->Find(SentMode()) : nullptr;
-    if (codec == nullptr) return Lose("WorldInfo has no rotation codes");
+    if (codec == nullptr) return Lose("WorldInfo has no rotation quantizations");
     world.max_pose_bytes = std::max(world.max_pose_bytes, codec->pose_bytes());
     world.codecs = *std::move(codecs);
   }

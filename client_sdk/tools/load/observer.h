@@ -131,9 +131,10 @@ class Observer final : public Session {
   LatencyProbes* probes_;
   std::uint64_t avatar_count_ = 0;
   std::vector<World> worlds_;
-  std::map<protocol::WorldId, std::size_t> world_by_id_;   ///< -> worlds_
-  std::map<protocol::Seq, std::size_t> pending_joins_;     ///< -> worlds_
-  std::map<protocol::Seq, std::size_t> pending_observes_;  ///< -> worlds_
+  // The values of these maps are indices of worlds_.
+  std::map<protocol::WorldId, std::size_t> world_by_id_;
+  std::map<protocol::Seq, std::size_t> pending_joins_;
+  std::map<protocol::Seq, std::size_t> pending_observes_;
   std::uint64_t seen_count_ = 0;
   std::uint64_t batch_number_ = 0;
   bool was_dropped_ = false;  ///< True if this program dropped the last connection.

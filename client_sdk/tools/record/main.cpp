@@ -103,6 +103,10 @@ int Run(int argc, char** argv) {
     return app.exit(help);
   } catch (const CLI::CallForVersion& version) {
     return app.exit(version);
+  } catch (const CLI::ExtrasError&) {
+    // The text of the exception lists the arguments in reverse order.
+    return PrintError(app.remaining().front() + ": unknown option or surplus argument (see --help)",
+                      kExitBadUsage);
   } catch (const CLI::ParseError& error) {
     return PrintError(std::string(error.what()) + " (see --help)", kExitBadUsage);
   }

@@ -42,7 +42,10 @@ export class AvatarCommands {
   private readonly playingLayers = new WeakMap<World, Set<string>>();
   /** Avatars whose foot planting is disabled, as far as the page knows. */
   private readonly unplantedAvatars = new WeakMap<World, Set<number>>();
-  /** While above 0, reported states may be older than a toggle and are ignored. */
+  /**
+   * Number of toggles whose effect reported states may not contain yet. While it is above 0, the
+   * page ignores reported states.
+   */
   private recentToggles = 0;
 
   constructor(private readonly host: CommandHost) {}

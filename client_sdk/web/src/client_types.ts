@@ -157,7 +157,7 @@ export interface Statistics {
   commandsSent: number;
   /** Commands sent again after a reconnect. */
   commandsResent: number;
-  /** Commands without a reply now. */
+  /** Commands whose reply has not arrived yet. */
   commandsWaiting: number;
   /** Connections that became ready. */
   connects: number;

@@ -418,9 +418,9 @@ STRIDEWIRE_EXPORT(on_output_written) void OnOutputWritten(Client* client) {
   client->session.OnOutputWritten();
 }
 
-/// Removes the oldest event from the queue and returns its type; -1 if there is none. Sets the
-/// text. results: 0 world, 1 status, 2 command, 3 accepted, 4 resumed, 5 dropped batches, 6 dropped
-/// events.
+/// Removes the oldest event from the queue and returns its type, or -1 if the queue is empty. Sets
+/// the text to that of the event. results: 0 world, 1 status, 2 command, 3 accepted, 4 resumed,
+/// 5 dropped batches, 6 dropped events.
 STRIDEWIRE_EXPORT(next_event) std::int32_t NextEvent(Client* client) {
   stridewire_event event;
   if (client->session.events().Take(std::span(&event, 1)) == 0) return -1;

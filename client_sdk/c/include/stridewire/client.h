@@ -692,8 +692,8 @@ stridewire_status stridewire_client_server_time(stridewire_client* client, doubl
 /// Gets the time at which to sample poses: the server time minus a delay. The client chooses the
 /// smallest delay with which poses arrive in time, and changes it smoothly: render time runs at
 /// most 5 % faster or slower than the server. It jumps only in a new session, after the server's
-/// clock has changed by more than 0.25 s, and if all poses of a second arrived too late. Sampled
-/// poses then belong to another segment.
+/// clock has changed by more than 0.25 s, and if for a second all poses were over 0.25 s too late,
+/// or the delay was over 0.5 s longer than necessary. Sampled poses then belong to another segment.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
 
 /// Describes how the render time adapts to the connection. Times are 0 before the first pose.
