@@ -132,6 +132,8 @@ TEST_F(LibraryTool, RejectsUnknownOrMissingCommands) {
   ExpectFailure({}, 2, "expected a command");
   ExpectFailure({"frobnicate"}, 2, "\"frobnicate\"");
   ExpectFailure({""}, 2, "\"\" is not a command");
+  ExpectFailure({"inspect", "builtin", "--bar", "7"}, 2,
+                "inspect: --bar: unknown option or surplus argument");
   ExpectFailure({"--frobnicate"}, 2, "--frobnicate");
 }
 

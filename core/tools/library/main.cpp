@@ -256,7 +256,12 @@ int Run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const auto commands = app.get_subcommands();
     const std::string command = commands.empty() ? "" : commands.front()->get_name() + ": ";
-    return PrintError(command + error.what());
+    std::string what = error.what();
+    // The text of an ExtrasError lists the arguments in reverse order.
+    if (const auto surplus = app.remaining(true); !surplus.empty()) {
+      what = surplus.front() + ": unknown option or surplus argument";
+    }
+    return PrintError(command + what);
   }
   if (*build_app) return RunBuild(build);
   if (*inspect_app) return RunInspect(inspect);

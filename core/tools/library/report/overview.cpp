@@ -38,7 +38,7 @@ constexpr Term kTerms[] = {
      "that examples are too similar."},
     {"Cardinal", "The method of this library: weights from cardinal basis functions."},
     {"Pseudoexample",
-     "Parameters with known weights, but without a motion of their own. "
+     "Parameters with known weights, for which the library stores no motion. "
      "Refinement adds them where the error is largest."},
     {"Keytimes", "The times of the events of a movement: start, toe-off, heel-strike and end."},
     {"Generic time",
