@@ -13,8 +13,8 @@ namespace {
 // kMargin.
 constexpr double kMarginOfWidth = 0.2;
 constexpr double kMargin = 0.12;
-// Replaces kMargin for joints that foot planting rotates. On uneven ground, with short legs and in
-// redirected swings, these joints rotate further than in the examples.
+// Replaces kMargin for hips, knees and ankles, because foot planting rotates them. On uneven
+// ground, with short legs and in redirected swings, they rotate further than in the examples.
 constexpr double kPlantedMargin = 0.3;
 // A component that varies by less than kStillWidth counts as constant. Its margin only has to cover
 // the quantization errors of the joints above it.
@@ -76,7 +76,8 @@ double LengthOf(const Vec3& v) {
   return std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
 }
 
-// Returns the joints that foot planting rotates, about any axis.
+// Returns the hips, knees and ankles. Foot planting rotates them about any axis. It also rotates
+// toes when it raises heels (decision 0056), but these have the usual margin.
 std::vector<bool> PlantedJoints(const Skeleton& skeleton) {
   std::vector<bool> planted(skeleton.joints.size(), false);
   for (const Leg& leg : skeleton.legs) {
