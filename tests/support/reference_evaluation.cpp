@@ -290,7 +290,8 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
                                     blended.ball_m + side.correction.offset_m, side.turn);
       side.correction.offset_m.y += lift_m;
       const double weight = side.correction.root_weight;
-      shift.y += (weight + entering * (1.0 - 2.0 * weight)) * lift_m;
+      const double followed_m = lift_m / (1.0 + lift_m / kRootFollowsLiftM);
+      shift.y += (weight + entering * (1.0 - 2.0 * weight)) * followed_m;
     }
     const Vec3 ankle = side.leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)];
     side.ankle_m =

@@ -463,15 +463,17 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
           (Float(1.0f) - second) *
               DepthBelow(trajectory.from, trajectory.normals[0], bones, leg, at, c.turn) +
           second * DepthBelow(trajectory.to, trajectory.normals[1], bones, leg, at, c.turn);
-      // The root follows this lift as it follows the other corrections of the foot. The fractions
-      // for the two feet change gradually, because the feet exchange their roles from step to step.
+      // The root follows this lift as it follows the other corrections of the foot, but a large
+      // lift bends the leg instead (kRootFollowsLiftM). The fractions for the two feet change
+      // gradually, because the feet exchange their roles from step to step.
       const Float entered = common.OfEaseOut(common.time_s - common.start_offset_s);
       const Float share =
           trajectory.root_weight +
           EaseOut(entered) * (Float(1.0f) - trajectory.root_weight - trajectory.root_weight);
       const Float lifted = Select(keeps_above, lift * planted, Float(0.0f));
       c.offset.y = c.offset.y + lifted;
-      c.root.y = c.root.y + lifted * share;
+      const Float followed = lifted / (Float(1.0f) + DivideBy(lifted, kRootFollowsLiftM));
+      c.root.y = c.root.y + followed * share;
     }
     balls[f] = ball + c.offset;
     ankles[f] = balls[f] + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);

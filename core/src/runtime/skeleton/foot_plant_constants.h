@@ -26,6 +26,10 @@ inline constexpr double kSoftGroundM = 0.006;
 // ground plane. The lift fades to zero at kFarFromPrintM.
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
+// If planting lifts a sole out of the ground, the root rises as well, but by less than this. The
+// toes of a foot that pushes off may sink by almost 3 cm. If the body followed them, it would rise
+// and fall within 0.1 s. The knee of that leg bends more instead.
+inline constexpr double kRootFollowsLiftM = 0.01;
 // During a swing, the ground plane that limits the foot changes from that of the old footprint to
 // that of the new one. The change begins at kGroundBlendStart and takes kGroundBlendLength, as
 // fractions of the swing.
