@@ -8,10 +8,10 @@
 namespace stridewire {
 
 /// Describes how the rotation q of one joint is quantized. Let d = conj(reference) q, negated if
-/// its w is negative. The code contains the components x, y and z of d: component c is low + k *
-/// step, and the code contains k in `bits` bits. A component without bits is `low`. The decoder
-/// computes w from the other components. A joint that may rotate in any direction uses
-/// smallest-three encoding of q instead, with `smallest_three_bits` per component.
+/// its w is negative. The components x, y and z of d are encoded: a component low + k * step is
+/// stored as the integer k in `bits` bits. A component without bits is `low`. The decoder computes
+/// w from the other components. A joint that may rotate in any direction uses smallest-three encoding
+/// of q instead, with `smallest_three_bits` per component.
 struct RotationQuantization {
   static constexpr std::uint8_t kMaxBits = 16;
   static constexpr std::uint8_t kMinFreeBits = 8;
@@ -28,7 +28,7 @@ struct RotationQuantization {
   std::array<std::uint8_t, 3> bits{};  ///< Bits of each component, 0 to kMaxBits.
   /// Bits per component of smallest-three encoding, kMinFreeBits to kMaxFreeBits; 0: not used.
   std::uint8_t smallest_three_bits = 0;
-  float least_w = 1.0f;  ///< Minimum w of d, kMinLeastW to 1.
+  float least_w = 1.0f;  ///< Minimum of the w of d, kMinLeastW to 1.
   bool operator==(const RotationQuantization&) const = default;
 };
 

@@ -20,7 +20,7 @@ struct PlantRecord {
   double to_s = 0.0;
   /// Target of the ball. Without planting, this is the position of the ball at `from_s`.
   DVec3 anchor_m = DVec3(0.0);
-  double drift_m = 0.0;  ///< Largest horizontal distance of the ball from the anchor.
+  double drift_m = 0.0;  ///< Largest horizontal distance of the ball from `anchor_m`.
 };
 
 /// Describes one played movement. Times are seconds since the start of the choreography.

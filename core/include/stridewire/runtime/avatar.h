@@ -240,7 +240,7 @@ struct WalkSpeeds {
   double slowest_m_s = 0.0;
   double fastest_m_s = 0.0;  ///< 0: unknown, because the library cannot walk far enough.
 
-  /// Speeds that differ by this fraction count as equal, because strides vary.
+  /// Speeds outside the range by at most this fraction count as inside, because strides vary.
   static constexpr double kTolerance = 0.05;
 
   /// Returns `speed_m_s` if the library can walk at this speed, otherwise the nearest end of the

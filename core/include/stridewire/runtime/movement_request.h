@@ -124,7 +124,8 @@ inline constexpr double kMaxRequestErrorRad = 1.0471975511965976;  ///< 60 degre
 
 /// Limits on requests. They are far wider than the range of any library, so they reject only absurd
 /// values.
-inline constexpr double kMaxRequestLengthM = 10.0;  ///< Magnitude of lengths, sides and heights.
+inline constexpr double kMaxRequestLengthM =
+    10.0;  ///< Maximum magnitude of lengths, sides and heights.
 inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;
 /// Maximum magnitude of a coordinate of a goal, waypoint or footprint.

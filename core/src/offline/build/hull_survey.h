@@ -51,7 +51,7 @@ class GroupProbe {
 // Creates one probe per thread. `threads` = 0: one per processor.
 [[nodiscard]] std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads);
 
-// The error e over the hull of the examples of a group.
+// The errors e(p) of synthesized movements, for parameters p in the hull of a group's examples.
 struct HullSurvey {
   double min_m = 0.0;
   double mean_m = 0.0;  // Mean error over the samples.

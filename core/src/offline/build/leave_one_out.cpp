@@ -59,9 +59,9 @@ Others OthersOf(const MotionGroup& group, int left_out, double cluster_diameter_
   return others;
 }
 
-// A group whose sites are made of all examples except one. It stores the motion of all examples,
-// but the weight of the excluded one is 0. Each site stands for a blend of examples, so a blend of
-// sites is a blend of examples as well.
+// A group that is fitted without one of the examples. Like a pseudoexample, each of its sites has a
+// weight per example, so a blend of sites is a blend of examples as well. The group stores the
+// motion of all examples, but the weights of the excluded one are 0.
 struct GroupOfOthers {
   CardinalBasis basis;
   std::vector<double> linear;

@@ -22,7 +22,8 @@ constexpr CorrectionLimits kSolve = {.max_iterations = 40, .tolerance_m = 1e-6};
 // The largest error must decrease by at least this fraction to count as an improvement. Smaller
 // changes are within the accuracy of SurveyHull.
 constexpr double kMinGain = 1e-3;
-// Factor on the limit of the sum of |w| at the samples, because the sum may be larger between them.
+// Fraction of the limit of the sum of |w| that is allowed at samples, because the sum may be larger
+// between them.
 constexpr double kSampledWeightShare = 0.96;
 constexpr std::array kOwnRadiusFactors = {1.0, 1.5, 2.0, 0.7};
 constexpr std::uint32_t kOtherSeed = 0x9e3779b9;

@@ -79,7 +79,8 @@ class JoltFilter {
            exceeds(world(point - 1), world(point), world(point + 1));
   }
 
-  // Increases the deviation around all jolts. Returns false if there are none.
+  // Increases the standard deviation of the filter around jolts. Returns false if there are none,
+  // or if all of them have the maximum deviation.
   bool WidenAtJolts() {
     std::vector<double> wider = deviation_s_;
     bool has_changed = false;

@@ -26,8 +26,8 @@ struct AveragedJoint {
 struct BvhFigure {
   std::vector<Joint> joints;
   std::vector<EndSite> end_sites;
-  std::vector<int> joint_lines;     ///< Line of the OFFSET of each joint.
-  std::vector<int> end_site_lines;  ///< Line of the OFFSET of each End Site.
+  std::vector<int> joint_lines;     ///< Line number of each joint's OFFSET.
+  std::vector<int> end_site_lines;  ///< Line number of each End Site's OFFSET.
   Clip clip;                        ///< Local rotations; its root positions are not set.
   std::vector<DVec3> roots;         ///< Root position in each frame.
   FoundLegs legs;

@@ -40,6 +40,8 @@ struct MissingAbility {
 
 /// Describes what avatars can do with a library.
 ///
+/// The comment of a member states, after a semicolon, which quantity its Ability::range covers.
+///
 /// Steps are classified by the positions of the feet in the first and last pose of each example. An
 /// example that is stored in several groups counts once. Pairs are indexed by Foot. The index is
 /// the moving foot for starts, stops, strides, backward steps and height differences, and the
@@ -51,10 +53,10 @@ struct LibrarySummary {
   Sides starts;          ///< Steps from feet together to feet apart; length in metres.
   /// Steps from feet apart to feet together; length of the previous stride in metres.
   Sides stops;
-  Sides strides;             ///< Steps forward; distance between the feet at the end, metres.
+  Sides strides;             ///< Steps forward; distance between the feet at the end in metres.
   Sides turns;               ///< Steps that turn; degrees, always positive.
   Sides side_steps;          ///< Steps to the side; sideways movement of the foot in metres.
-  Sides back_steps;          ///< Steps backward; distance between the feet at the end, metres.
+  Sides back_steps;          ///< Steps backward; distance between the feet at the end in metres.
   Sides climbs;              ///< Steps up; height of the moving foot above the fixed foot, metres.
   Sides descents;            ///< Steps down; depth of the moving foot below the fixed foot, metres.
   ValueRange speed_m_s;      ///< Speed of the body in `strides`.
