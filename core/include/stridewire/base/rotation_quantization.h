@@ -10,8 +10,8 @@ namespace stridewire {
 /// Describes how the rotation q of one joint is quantized. Let d = conj(reference) q, negated if
 /// its w is negative. The components x, y and z of d are encoded: a component low + k * step is
 /// stored as the integer k in `bits` bits. A component without bits is `low`. The decoder computes
-/// w from the other components. A joint that may rotate in any direction uses smallest-three encoding
-/// of q instead, with `smallest_three_bits` per component.
+/// w from the other components. A joint that may rotate in any direction uses smallest-three
+/// encoding of q instead, with `smallest_three_bits` per component.
 struct RotationQuantization {
   static constexpr std::uint8_t kMaxBits = 16;
   static constexpr std::uint8_t kMinFreeBits = 8;
