@@ -11,8 +11,10 @@ namespace stridewire {
 namespace {
 
 DQuat AxisTurn(int axis, double degrees) {
-  // remainder() is exact and reduces the argument to the range of base/trig.h.
-  const double half = std::remainder(degrees, 720.0) * (0.5 * std::numbers::pi / 180.0);
+  // remainder() is exact and reduces the argument to the range of base/trig.h. It is slow, and few
+  // angles need it.
+  const double reduced = std::fabs(degrees) <= 360.0 ? degrees : std::remainder(degrees, 720.0);
+  const double half = reduced * (0.5 * std::numbers::pi / 180.0);
   DQuat q(Cos(half), 0.0, 0.0, 0.0);
   (axis == 0 ? q.x : axis == 1 ? q.y : q.z) = Sin(half);
   return q;
