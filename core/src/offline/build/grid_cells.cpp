@@ -92,6 +92,8 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
     cells[i] = cells_at(length.mean_s, fps);
     most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
   }
+  // Generated steps are so smooth that they never need more cells.
+  if (group.is_completed) return cells;
   // Cells are added but never removed, so an example whose error is small is not measured again.
   std::vector<const RawExample*> rough;
   for (const RawExample& example : group.examples) rough.push_back(&example);

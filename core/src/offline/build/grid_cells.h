@@ -15,7 +15,8 @@ inline constexpr double kStoredErrorRad = 0.45 / 57.29577951308232;
 // error above kStoredErrorRad. More cells are needed for slow examples in a group of fast ones, and
 // for captures with fast rotations: with 30 cells per second, steps of subject 01 have a mean error
 // of 0.6 degrees and up to 1.2. The number is limited by the frames of the longest example and by
-// the size of the grid. `stand_root`: see ResampleOnGrid.
+// the size of the grid. Generated steps are not measured, since they are smooth. `stand_root`: see
+// ResampleOnGrid.
 [[nodiscard]] std::vector<int> ChooseCells(const RawGroup& group, double fps,
                                            const GridLayout& layout, const Quat& stand_root);
 

@@ -39,8 +39,6 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
                            const GridLayout& layout, const Quat& stand_root) {
   STRIDEWIRE_CHECK(example.keytimes_s.size() == cells.size() + 1);
   STRIDEWIRE_CHECK(example.clip.joint_count == layout.joint_count);
-  Clip clip = example.clip;
-  MakeSignContinuous(clip);
   const TimeWarp warp(example.keytimes_s, cells);
   int point_count = 1;
   for (const int count : cells) point_count += count;
@@ -54,10 +52,10 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   result.rows.assign(static_cast<std::size_t>(point_count) * row_floats, 0.0f);
 
-  Pose pose(clip.joint_count);
+  Pose pose(example.clip.joint_count);
   double yaw_rad = 0.0;
   for (int p = 0; p < point_count; ++p) {
-    SampleClip(clip, warp.TimeAt(p), pose);
+    SampleClip(example.clip, warp.TimeAt(p), pose);
     float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
     double wrapped_rad = yaw_rad;
     // If the root is nearly vertical, HeadingOf leaves the previous yaw unchanged.
@@ -65,7 +63,12 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
     yaw_rad = UnwrapAngle(wrapped_rad, yaw_rad);
     pose.rotations[0] = YawRotation(-yaw_rad) * pose.rotations[0];
     for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
-      GridLayout::SetRotation(row, j, Normalise(pose.rotations[j]));
+      Quat rotation = Normalise(pose.rotations[j]);
+      // Blending needs quaternions that are continuous in sign; those of the clip may not be.
+      if (p > 0 && Dot(GridLayout::RotationOf(row - row_floats, j), rotation) < 0.0f) {
+        rotation = -rotation;
+      }
+      GridLayout::SetRotation(row, j, rotation);
     }
     layout.SetRoot(row, {DVec3(pose.root_position_m), yaw_rad});
   }

@@ -127,8 +127,9 @@ Transition Nearest(const std::vector<Moment>& ends, const std::vector<Moment>& s
   double least_m = HUGE_VAL;
   for (const Moment& end : ends) {
     for (const Moment& start : starts) {
-      const double distance_m =
-          RootMeanSquareM(end.joints_m, start.joints_m) +
+      double distance_m = RootMeanSquareM(end.joints_m, start.joints_m);
+      if (distance_m >= least_m) continue;
+      distance_m +=
           kTransitionVelocityS * RootMeanSquareM(end.velocities_m_s, start.velocities_m_s);
       if (distance_m >= least_m) continue;
       least_m = distance_m;

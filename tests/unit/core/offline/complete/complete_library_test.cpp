@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "captured_library.h"
+#include "offline/build/grid_cells.h"
 #include "offline/builtin/builtin_library.h"
 #include "offline/complete/stride_model.h"
 #include "offline/inspect/self_check.h"
@@ -354,6 +355,23 @@ TEST_P(CompleteCaptures, EveryTakePassesTheSelfCheck) {
     for (const CheckResult& check : CheckLibrary(library).checks) {
       EXPECT_EQ(check.verdict, CheckVerdict::kPassed) << check.name << ": " << check.text;
     }
+  }
+}
+
+// ChooseCells does not measure the stored error of generated steps.
+TEST_P(CompleteCaptures, GeneratedStepsAreStoredAccurately) {
+  const std::vector<std::string> subjects = {GetParam()};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const RawLibrary library = Completed(AssembleTakes(TakesOf(subjects), {.mirror = true}));
+  const GridLayout layout(library.skeleton.joint_count());
+  const Quat& stand_root = library.stand_pose.rotations[0];
+  const double fps = LibraryBuilder{}.grid_fps;
+  for (const RawGroup* group : CompletedGroups(library)) {
+    RawGroup measured = *group;
+    measured.is_completed = false;
+    EXPECT_EQ(ChooseCells(*group, fps, layout, stand_root),
+              ChooseCells(measured, fps, layout, stand_root))
+        << group->examples.front().source;
   }
 }
 
