@@ -97,25 +97,25 @@ class StepGenerator {
     end_share_ = Share((feet.end_m.z - stand_z) / (stride_.end_length_m - stand_z));
     SetTiming();
     PlanRoot();
+    const int frames = static_cast<int>(std::floor(end_s_ * kFps + 0.5)) + 1;
+    moments_.reserve(static_cast<std::size_t>(frames));
+    for (int f = 0; f < frames; ++f) moments_.push_back(MomentAt(f / kFps));
     PlanSwing();
   }
 
   RawExample Run(std::span<const ParameterName> names, std::string source) {
-    const int frames = static_cast<int>(std::floor(end_s_ * kFps + 0.5)) + 1;
     RawExample example;
     example.keytimes_s = {0.0, toe_off_s_, strike_s_, end_s_};
     example.heading_change_rad = feet_.turn_rad;
     example.source = std::move(source);
     example.clip.fps = kFps;
+    const auto frames = static_cast<int>(moments_.size());
     example.clip.Resize(frames, person_.skeleton.joint_count());
-    std::vector<Moment> moments;
-    moments.reserve(static_cast<std::size_t>(frames));
-    for (int f = 0; f < frames; ++f) moments.push_back(MomentAt(f / kFps));
-    const std::vector<double> lowered_m = Lowering(moments);
-    const DVec3 origin = moments.front().root_m;
+    const std::vector<double> lowered_m = Lowering();
+    const DVec3 origin = moments_.front().root_m;
     for (int f = 0; f < frames; ++f) {
       const auto i = static_cast<std::size_t>(f);
-      Pose pose = PoseAt(moments[i], lowered_m[i]);
+      Pose pose = PoseAt(moments_[i], lowered_m[i]);
       pose.root_position_m -=
           Vec3(static_cast<float>(origin.x), 0.0f, static_cast<float>(origin.z));
       PoseSpan out = example.clip.frame(f);
@@ -129,6 +129,7 @@ class StepGenerator {
 
  private:
   struct Leg {
+    LegPose pose;          // Before inverse kinematics, relative to the root.
     DQuat ankle_rotation;  // World rotation of the foot in the step.
     // Position of the ball relative to the fixed ball, before the detour and the lift are added.
     DVec3 ball_m = DVec3(0.0);
@@ -202,9 +203,9 @@ class StepGenerator {
   [[nodiscard]] Leg LegAt(Foot foot, double time_s, const PostureSample& stride,
                           const Pose& posture) const {
     const LegRig::Side& side = person_.rig.side(foot);
-    LegPose pose;
-    EvaluateLeg(person_.skeleton, person_.rig, posture, foot, pose);
     Leg leg;
+    LegPose& pose = leg.pose;
+    EvaluateLeg(person_.skeleton, person_.rig, posture, foot, pose);
     leg.ankle_rotation = AnkleRotationAt(foot, time_s, stride);
     leg.ball_m = PlainBallAt(foot, time_s, stride);
     leg.hip_m = DVec3(pose.positions_m[static_cast<std::size_t>(side.hip)]);
@@ -362,8 +363,10 @@ class StepGenerator {
     return nearest;
   }
 
-  [[nodiscard]] Moment MomentOfSwing(double part) const {
-    return MomentAt(toe_off_s_ + part * (strike_s_ - toe_off_s_));
+  // Returns the moment nearest to a fraction of the swing, 0 to 1.
+  [[nodiscard]] const Moment& MomentOfSwing(double part) const {
+    const double time_s = toe_off_s_ + part * (strike_s_ - toe_off_s_);
+    return moments_[static_cast<std::size_t>(std::floor(time_s * kFps + 0.5))];
   }
 
   // If the step turns, leads the swinging foot around the fixed one. Raises it until it clears the
@@ -373,7 +376,7 @@ class StepGenerator {
     const LegRig::Side& side = person_.rig.side(moving_);
     const double ball_y = person_.stand.balls_m[Index(moving_)].y;
     struct Check {
-      Moment moment;
+      const Moment* moment;
       double ball_m;  // Minimum height of the ball.
       double tip_m;   // Minimum height of the toe tip.
     };
@@ -381,23 +384,21 @@ class StepGenerator {
     for (int i = 4; i <= 17; ++i) {
       const double part = 0.05 * i;
       const bool is_early = part < 0.3;
-      checks.push_back({MomentOfSwing(part), ball_y + (is_early ? 0.0 : kClearanceM),
+      checks.push_back({&MomentOfSwing(part), ball_y + (is_early ? 0.0 : kClearanceM),
                         side.toe_height_m + (is_early ? 0.0 : kTipClearanceM)});
     }
     const auto is_clear = [&](const Check& check) {
-      return BallAt(moving_, check.moment).y >= check.ball_m &&
-             TargetAt(moving_, check.moment).tip_m.y >= check.tip_m;
+      return BallAt(moving_, *check.moment).y >= check.ball_m &&
+             TargetAt(moving_, *check.moment).tip_m.y >= check.tip_m;
     };
     while (!std::ranges::all_of(checks, is_clear) && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
   }
 
   void PlanDetour() {
-    std::vector<Moment> moments;
-    for (int i = 1; i < 10; ++i) moments.push_back(MomentOfSwing(0.1 * i));
     detour_m_ = builtin::FindDetour(kDetours, [&](double detour_m) {
       detour_m_ = detour_m;
       double nearest = kDetours.max_m;
-      for (const Moment& moment : moments) nearest = std::min(nearest, FeetApart(moment));
+      for (int i = 1; i < 10; ++i) nearest = std::min(nearest, FeetApart(MomentOfSwing(0.1 * i)));
       return nearest;
     });
   }
@@ -427,18 +428,18 @@ class StepGenerator {
 
   // Returns how far the root is lowered at each moment so that the legs reach the feet. At both
   // ends, the lowering depends only on the pose at that end, so that successive steps fit together.
-  [[nodiscard]] std::vector<double> Lowering(const std::vector<Moment>& moments) const {
+  [[nodiscard]] std::vector<double> Lowering() const {
     constexpr int kRounds = 3;
     constexpr int kHalf = 10;
     constexpr double kFramesFromEnds = 8.0;
     std::vector<double> weights;
     for (int k = -kHalf; k <= kHalf; ++k) weights.push_back(1.0 - std::fabs(k) / (kHalf + 1.0));
-    const std::size_t count = moments.size();
+    const std::size_t count = moments_.size();
     std::vector<double> reach_missing;
     reach_missing.reserve(count);
-    for (const Moment& moment : moments) reach_missing.push_back(MissingReach(moment));
+    for (const Moment& moment : moments_) reach_missing.push_back(MissingReach(moment));
     const double first = reach_missing.front();
-    const double last = MissingReach(MomentAt(end_s_));
+    const double last = reach_missing.back();
     std::vector<double> lowered(count, 0.0);
     for (std::size_t i = 0; i < count; ++i) {
       const double part = static_cast<double>(i) / static_cast<double>(count - 1);
@@ -463,10 +464,9 @@ class StepGenerator {
     DVec3 root = moment.root_m;
     root.y -= lowered_m;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      LegPose leg;
-      EvaluateLeg(person_.skeleton, person_.rig, pose, foot, leg);
-      SolveLeg(person_.rig, foot, leg, Vec3(TargetAt(foot, moment).ankle_m - root),
-               Quat(moment.legs[Index(foot)].ankle_rotation), pose);
+      const Leg& leg = moment.legs[Index(foot)];
+      SolveLeg(person_.rig, foot, leg.pose, Vec3(TargetAt(foot, moment).ankle_m - root),
+               Quat(leg.ankle_rotation), pose);
     }
     pose.root_position_m = Vec3(root);
     return pose;
@@ -485,6 +485,7 @@ class StepGenerator {
   std::array<double, 2> reach_m_{};  // [Foot]: largest distance from hip to ankle.
   HermiteCurve captured_;            // Curve with the start and end of the captured root.
   HermiteCurve root_;                // Curve with the start and end of the generated root.
+  std::vector<Moment> moments_;      // [frame]
   double detour_m_ = 0.0;
   double lift_m_ = 0.0;
 };
