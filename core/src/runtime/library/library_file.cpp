@@ -12,7 +12,7 @@ namespace stridewire {
 
 static_assert(
     std::endian::native == std::endian::little,
-    "library files are used as mapped; a big-endian build needs a loader that converts them");
+    "library files are read in place and are little-endian; other machines need a conversion");
 
 LibraryHash HashPayload(std::span<const std::byte> payload) {
   const XXH128_hash_t hash = XXH3_128bits(payload.data(), payload.size());

@@ -24,11 +24,11 @@ constexpr Term kTerms[] = {
      "change of heading to the left. Jumps have a length and a height."},
     {"Hull", "The region of parameters between the examples of a group."},
     {"Error",
-     "The largest difference between the parameters that a movement was asked for and "
-     "those measured on it. A radian counts as 0.5 m."},
+     "The largest difference between the requested parameters of a movement and those "
+     "measured on it. A radian counts as 0.5 m."},
     {"Correction",
      "When a movement starts, its weights are changed until it has the parameters "
-     "that were asked for."},
+     "that were requested."},
     {"Weights", "The shares of the examples in a movement. They sum to 1 and may be negative."},
     {"Sum |w|",
      "The largest sum of the absolute weights. Values above 2.5 exaggerate differences "

@@ -53,7 +53,7 @@ std::string GroupTables(const Report& report) {
   return TableHtml(rows) +
          "<h3>Errors of movements</h3>\n<p>How far the parameters of synthesized movements are "
          "from "
-         "those asked for, over the hull of the examples. Avatars play corrected movements; the "
+         "the requested ones, over the hull of the examples. Avatars play corrected movements; the "
          "last columns say how many iterations that takes and how extreme the weights "
          "become.</p>\n" +
          TableHtml(errors) +
