@@ -1,6 +1,7 @@
 """Writes the C++ code of the protocol: limits, message structs, checks, decoding and encoding."""
 
 import re
+from dataclasses import replace
 
 HEAD = "// Generated from {schema} by protocol/generator. Do not edit.\n"
 # Type aliases of message_parts.h, by the name of the field.
@@ -147,7 +148,8 @@ class Cpp:
     def unpack(self, f, in_struct):
         m, at, w = self.member(f), self.at(f), f"w.{f.name}()"
         if f.is_list:
-            name = "UnpackList" if f.type in self.schema.tables else "u.Entries"
+            entries = "u.Borrow" if "borrowed" in f else "u.Entries"
+            name = "UnpackList" if f.type in self.schema.tables else entries
             first = "u, " if f.type in self.schema.tables else ""
             return f"{name}({first}{w}, {self.bounds(f)}, {at}, {m});"
         if f.type == "string":
@@ -217,6 +219,8 @@ class Cpp:
         """A statement that builds a field which is stored by offset, or a struct; else None."""
         m = self.member(f)
         keep = "true" if "keep_empty" in f else "false"
+        if other := f.get("keep_empty"):
+            keep = f"!m.{other}.empty()"
         if f.is_list:
             if f.type in self.schema.tables and not self.schema.is_struct(f.type):
                 entries = f"{f.name}_entries" if "early" in f else f"Entries(b, {m})"
@@ -288,7 +292,8 @@ class Cpp:
         if "variant" in table:
             return self.variant_build_function(table)
         lines = [self.build_early(f) for f in table.fields if "early" in f]
-        lines += [line for f in table.fields if (line := self.build(f))]
+        fields = reversed(table.fields) if "reversed" in table else table.fields
+        lines += [line for f in fields if (line := self.build(f))]
         if "in_order" in table:
             lines.append(f"wire::{table.name}Builder builder(b);")
             for f in table.fields:
@@ -352,7 +357,7 @@ class Cpp:
         else:
             name = CPP_TYPES[f.type]
         if f.is_list and name != "ParameterSet":
-            return f"std::vector<{name}>"
+            return f"std::span<const {name}>" if "borrowed" in f else f"std::vector<{name}>"
         is_optional = f.default == "null" or "optional" in f
         return f"std::optional<{name}>" if is_optional else name
 
@@ -395,7 +400,29 @@ class Cpp:
                 lines.append(f"  {type_name} {name}{self.initializer(f, type_name)};")
         return "\n".join(lines + self.struct_end(table)) + "\n"
 
+    def groups(self, table):
+        """The fields of each member with the attribute `group`, with paths inside this member."""
+        groups = {}
+        for f in table.fields:
+            name, _, path = f.get("cpp", "").partition(".")
+            if path:
+                groups.setdefault(name, []).append(
+                    replace(f, attributes={**f.attributes, "cpp": path}))
+        return {fields[0].get("group"): fields for fields in groups.values()}
+
+    def group_struct(self, name, fields):
+        """The comment of the first field describes the whole struct."""
+        lines = [f"/// {line}" for line in fields[0].doc] + [f"struct {name} {{"]
+        for i, f in enumerate(fields):
+            lines += [f"  /// {line}" for line in f.doc if i > 0]
+            type_name = self.member_type(f)
+            lines.append(f"  {type_name} {f.get('cpp')}{self.initializer(f, type_name)};")
+        equal = f"bool operator==(const {name}&) const = default;"
+        return "\n".join(lines + [f"  {equal}", "};"]) + "\n"
+
     def struct_end(self, table):
+        if any("borrowed" in f for f in table.fields):
+            return ["};"]
         equal = f"bool operator==(const {self.type_name(table.name)}&) const = default;"
         return [f"  {equal}", "};"]
 
@@ -438,11 +465,18 @@ class Cpp:
         return done
 
     def structs_header(self):
+        structs, done = [], set(self.schema.tables)
+        for table in self.in_order_of_use():
+            for name, fields in self.groups(table).items():
+                if name not in done:
+                    structs.append(self.group_struct(name, fields))
+                    done.add(name)
+            structs.append(self.struct(table))
         alternatives = ", ".join(self.type_name(m.name) for m in self.schema.messages)
         return (self.head() + "#pragma once\n\n"
                 '#include "stridewire/protocol/message_parts.h"\n\n'
                 "namespace stridewire::protocol {\n\n" +
-                "\n".join(self.struct(t) for t in self.in_order_of_use()) +
+                "\n".join(structs) +
                 f"\n/// Any message.\nusing Message = std::variant<{alternatives}>;\n"
                 "\n}  // namespace stridewire::protocol\n")
 

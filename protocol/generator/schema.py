@@ -12,10 +12,11 @@ SCALARS = {"bool": 1, "byte": 1, "ubyte": 1, "short": 2, "ushort": 2, "int": 4, 
            "float": 4, "long": 8, "ulong": 8, "double": 8}
 
 TABLE_ATTRIBUTES = {
-    "bulk", "cpp", "handwritten", "in_order", "meaning", "message", "native", "sender", "variant",
+    "bulk", "cpp", "handwritten", "in_order", "meaning", "message", "native", "reversed", "sender",
+    "variant",
 }
 FIELD_ATTRIBUTES = {
-    "above", "below", "bytes", "cpp", "deprecated", "early", "enumerators", "group",
+    "above", "below", "borrowed", "bytes", "cpp", "deprecated", "early", "enumerators", "group",
     "initial", "inverted", "json_array", "json_omit", "json_place", "keep_empty", "max", "min",
     "needed", "nonzero", "number", "omit_zero", "only", "optional", "shared", "status", "web",
     "with", "without",
@@ -223,8 +224,8 @@ class Schema:
         for table in self.tables.values():
             for f in table.all_fields:
                 self._check_field(f, f"{table.name}.{f.name}")
-                for other in (f.get("with"), f.get("without")):
-                    if other is not None and other not in [each.name for each in table.fields]:
+                for other in (f.get("with"), f.get("without"), f.get("keep_empty")):
+                    if other and other not in [each.name for each in table.fields]:
                         self.fail(f.line, f"{table.name}.{f.name}: there is no field '{other}'")
 
     def _check_field(self, f, where):

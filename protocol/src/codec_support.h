@@ -85,8 +85,8 @@ inline Offset<flatbuffers::String> SharedText(FlatBufferBuilder& b, const std::s
 }
 
 /// Builds a list of numbers, enums or bytes.
-template <typename T>
-auto ScalarList(FlatBufferBuilder& b, const std::vector<T>& list, bool keep_empty) {
+auto ScalarList(FlatBufferBuilder& b, const auto& list, bool keep_empty) {
+  using T = std::remove_cvref_t<decltype(list[0])>;
   using Number = std::conditional_t<std::is_arithmetic_v<T>, T, std::uint8_t>;
   static_assert(sizeof(Number) == sizeof(T));
   if (list.empty() && !keep_empty) return Offset<flatbuffers::Vector<Number>>();

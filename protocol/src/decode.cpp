@@ -10,24 +10,6 @@ namespace stridewire::protocol {
 
 static_assert(std::endian::native == std::endian::little, "batches are read in place");
 
-// A batch borrows its lists from the payload.
-void Unpack(Unpacker&, const FieldPath&, const wire::PoseBatch& w, PoseBatch& m) {
-  m.info = {w.world(),
-            w.shard(),
-            w.part(),
-            w.parts(),
-            w.tick(),
-            w.server_time_s(),
-            static_cast<PoseMode>(w.mode()),
-            w.joint_count(),
-            w.partial()};
-  if (const auto* avatars = w.avatars()) m.avatars = {avatars->data(), avatars->size()};
-  if (const auto* flags = w.flags()) m.flags = {flags->data(), flags->size()};
-  if (const auto* poses = w.poses()) {
-    m.poses = {reinterpret_cast<const std::byte*>(poses->data()), poses->size()};
-  }
-}
-
 namespace {
 
 template <typename Wire, typename T>

@@ -13,10 +13,6 @@ constexpr std::size_t kKeptBuilderBytes = std::size_t{1} << 20;
 
 }  // namespace
 
-Offset<wire::PoseBatch> Build(FlatBufferBuilder& b, const PoseBatch& m) {
-  return BuildPoseBatch(b, m);
-}
-
 struct Encoder::Impl {
   FrameLimits limits;
   FlatBufferBuilder builder;

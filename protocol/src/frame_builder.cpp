@@ -48,13 +48,4 @@ flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
                                info.joint_count, avatars, flags, poses, info.is_partial);
 }
 
-flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(flatbuffers::FlatBufferBuilder& builder,
-                                                    const PoseBatch& batch) {
-  const auto* bytes = reinterpret_cast<const std::uint8_t*>(batch.poses.data());
-  const auto poses = builder.CreateVector(bytes, batch.poses.size());
-  const auto flags = builder.CreateVector(batch.flags.data(), batch.flags.size());
-  const auto avatars = builder.CreateVector(batch.avatars.data(), batch.avatars.size());
-  return BuildPoseBatch(builder, batch.info, avatars, flags, poses);
-}
-
 }  // namespace stridewire::protocol

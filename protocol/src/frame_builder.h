@@ -31,8 +31,4 @@ inline constexpr std::size_t kPoseBatchOverheadBytes = 128;
     flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> flags,
     flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> poses);
 
-/// Copies the lists of a batch into `builder` and builds its table.
-[[nodiscard]] flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
-    flatbuffers::FlatBufferBuilder& builder, const PoseBatch& batch);
-
 }  // namespace stridewire::protocol

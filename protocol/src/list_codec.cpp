@@ -1,10 +1,7 @@
 #include "codec_support.h"
 
-/// Encodes, decodes and checks what the schema's attributes cannot express: sets of parameters and
-/// lists of movement records.
+/// Encodes, decodes and checks sets of parameters, which are lists on the wire.
 namespace stridewire::protocol {
-
-// ---- sets of parameters
 
 void CheckList(Findings& found, const ParameterSet& set, const Bounds& bounds,
                const FieldPath& at) {
@@ -37,19 +34,6 @@ Offset<WireParameters> StructList(FlatBufferBuilder& b, const ParameterSet& set,
     values[p] = wire::ParameterValue(set.values[p], set.names[p]);
   }
   return b.CreateVectorOfStructs(values.data(), set.count);
-}
-
-// ---- movement records
-
-Offset<wire::Movements> Build(FlatBufferBuilder& b, const Movements& m) {
-  // Most steps of a small crowd have no changes, and then all lists are omitted. Otherwise the
-  // records are written even if they are empty, because all avatars are gone.
-  const auto records = ScalarList(b, m.records, !m.avatars.empty());
-  const auto ends = ScalarList(b, m.ends, false);
-  const auto flags = ScalarList(b, m.flags, false);
-  const auto avatars = ScalarList(b, m.avatars, false);
-  return wire::CreateMovements(b, m.world, m.shard, m.part, m.parts, m.more_steps, m.step, m.tick,
-                               m.server_time_s, m.states, avatars, flags, ends, records);
 }
 
 }  // namespace stridewire::protocol

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -43,15 +44,22 @@ class Unpacker : public Findings {
     out.assign(text->data(), text->size());
   }
 
-  /// Copies a list of numbers. `T` is a number, an enum or std::byte of the same size.
+  /// Refers to a list of numbers. `T` is a number, an enum or std::byte of the same size.
+  template <typename W, typename T>
+  void Borrow(const flatbuffers::Vector<W>* list, const Bounds& bounds, const FieldPath& at,
+              std::span<const T>& out) {
+    static_assert(sizeof(W) == sizeof(T));
+    if (const std::size_t count = CountOf(list, bounds, at); count > 0) {
+      out = {reinterpret_cast<const T*>(list->data()), count};
+    }
+  }
+  /// Copies such a list.
   template <typename W, typename T>
   void Entries(const flatbuffers::Vector<W>* list, const Bounds& bounds, const FieldPath& at,
                std::vector<T>& out) {
-    static_assert(sizeof(W) == sizeof(T));
-    if (const std::size_t count = CountOf(list, bounds, at); count > 0) {
-      const auto* data = reinterpret_cast<const T*>(list->data());
-      out.assign(data, data + count);
-    }
+    std::span<const T> entries;
+    Borrow(list, bounds, at, entries);
+    out.assign(entries.begin(), entries.end());
   }
 };
 

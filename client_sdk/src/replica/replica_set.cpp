@@ -43,7 +43,7 @@ Status ReplicaSet::ApplyRecord(const protocol::Movements& message, std::size_t i
   }
   if (!is_known || found->replica == nullptr) {
     // A change is useless without the state that it changes. The server sends that state later.
-    const bool is_state = AvatarReplica::IsState(message.record(i));
+    const bool is_state = AvatarReplica::IsState(RecordOf(message, i));
     if (!is_state || !sink.Wants(id) || avatar_count_ >= max_avatars_) return {};
     if (!is_known) found = shard.avatars.insert(found, Avatar{.id = id});
     found->replica = std::make_unique<AvatarReplica>(library_);
@@ -51,7 +51,7 @@ Status ReplicaSet::ApplyRecord(const protocol::Movements& message, std::size_t i
     ++avatar_count_;
   }
   if ((message.flags[i] & protocol::kPoseDiscontinuity) != 0) found->discontinuity = true;
-  return found->replica->Apply(message.record(i), plan_scratch_);
+  return found->replica->Apply(RecordOf(message, i), plan_scratch_);
 }
 
 void ReplicaSet::EmitPose(const protocol::Movements& message, Avatar& avatar, PoseSink& sink) {

@@ -75,7 +75,7 @@ protocol::Movements MovementFeed::Select(const protocol::Movements& step, std::s
   deselected_.erase(deselected_.begin(), reported);
   for (std::size_t i = 0; i < step.avatars.size(); ++i) {
     if (!std::ranges::binary_search(selected_, step.avatars[i])) continue;
-    add(step.avatars[i], step.flags[i], step.record(i));
+    add(step.avatars[i], step.flags[i], RecordOf(step, i));
   }
   return result;
 }

@@ -35,8 +35,8 @@ protocol::CurrentMovement CurrentMovementOf(const AvatarSimulation& avatar,
       continue;
     }
     current.landings.push_back(
-        {foot == Foot::kLeft ? protocol::FootSide::kLeft : protocol::FootSide::kRight,
-         trajectory.to.position_m, trajectory.to.heading_rad});
+        {trajectory.to.position_m, trajectory.to.heading_rad,
+         foot == Foot::kLeft ? protocol::FootSide::kLeft : protocol::FootSide::kRight});
   }
   const MotionGroup& group = avatar.library().group(movement->group);
   const std::size_t parameter_count = std::min(group.parameters.size(), protocol::kMaxParameters);

@@ -13,6 +13,7 @@
 #include "random.h"
 #include "runtime/avatar/avatar_replica.h"
 #include "stridewire/offline/open_library.h"
+#include "stridewire/protocol/pose_batch_reader.h"
 #include "test_server.h"
 
 namespace stridewire {
@@ -48,14 +49,15 @@ class MovementReader {
         continue;
       }
       std::unique_ptr<AvatarReplica>& replica = shard.avatars[avatar];
-      if (replica == nullptr && AvatarReplica::IsState(message.record(i))) {
+      if (replica == nullptr && AvatarReplica::IsState(RecordOf(message, i))) {
         replica = std::make_unique<AvatarReplica>(library_);
       }
       if (replica == nullptr) {
         shard.avatars.erase(avatar);
         continue;
       }
-      if (Status status = replica->Apply(message.record(i), plan_scratch_); !status) return status;
+      if (Status status = replica->Apply(RecordOf(message, i), plan_scratch_); !status)
+        return status;
       due.push_back(avatar);
     }
     if (!message.states) {
@@ -164,9 +166,10 @@ class DualObserver {
         states_ += movements->states;
         for (const AvatarId avatar : movements->avatars) ++message_counts_[avatar];
       } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
-        for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
-          const auto pose = batch->pose(i);
-          full_[{batch->info.tick, batch->avatars[i]}].assign(pose.begin(), pose.end());
+        protocol::PoseBatchReader reader(*batch, nullptr);
+        for (const AvatarId avatar : batch->avatars) {
+          const auto pose = reader.Next();
+          full_[{batch->info.tick, avatar}].assign(pose.begin(), pose.end());
         }
         last_tick_ = batch->info.tick;
       } else if (const auto* events = std::get_if<protocol::Events>(&*message)) {

@@ -338,7 +338,7 @@ TEST(ServerSession, TeleportsLivingAvatars) {
     } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
       ASSERT_EQ(batch->avatars.size(), 1u);
       float x_m = 0.0f;
-      std::memcpy(&x_m, batch->pose(0).data(), sizeof x_m);
+      std::memcpy(&x_m, batch->poses.data(), sizeof x_m);
       if (jumped_tick != 0 || x_m < 9.0f) continue;
       jumped_tick = batch->info.tick;
       EXPECT_NEAR(x_m, 10.0f, 0.1f);

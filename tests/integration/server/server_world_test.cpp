@@ -366,7 +366,8 @@ TEST(ServerWorld, SendsQuantisedPosesInCompactMode) {
     ++compared;
     Vec3 root;
     std::vector<Quat> rotations(parents.size());
-    ASSERT_TRUE(protocol::DecodePose(PoseMode::kFull, batch->pose(0), root, rotations));
+    ASSERT_TRUE(protocol::DecodePose(
+        PoseMode::kFull, protocol::PoseBatchReader(*batch, nullptr).Next(), root, rotations));
     for (std::size_t j = 0; j < parents.size(); ++j) {
       // Each joint compensates the errors of its ancestors: up to two errors of 0.23 degrees.
       EXPECT_LE(AngleBetween(rotations[j], seen[batch->info.tick][j]), 0.009) << j;

@@ -39,7 +39,7 @@ AvatarState GoodState() {
                     .weights = {0.5f, 0.5f},
                     .parameter_names = {2, 5},
                     .sites = {1.0f, 2.0f, 3.0f, 4.0f},
-                    .landings = {{FootSide::kRight, DVec3(1.0), 0.5}}};
+                    .landings = {{DVec3(1.0), 0.5, FootSide::kRight}}};
   state.layers = {{"wave"}, {"carry"}};
   state.queue = {{3, 1, StepMovement{}}, {3, 2, StandMovement{}}};
   return state;
@@ -603,9 +603,9 @@ TEST(Check, Movements) {
                .records = std::vector<std::byte>(10)};
   constexpr auto kRange = ErrorCode::kOutOfRange;
   constexpr auto kShape = ErrorCode::kShapeMismatch;
-  EXPECT_EQ(good.record(0).size(), 4u);
-  EXPECT_EQ(good.record(1).size(), 0u);
-  EXPECT_EQ(good.record(2).data(), good.records.data() + 4);
+  EXPECT_EQ(RecordOf(good, 0).size(), 4u);
+  EXPECT_EQ(RecordOf(good, 1).size(), 0u);
+  EXPECT_EQ(RecordOf(good, 2).data(), good.records.data() + 4);
   Refused<M>(good, [](M& m) { m.world = 0; }, kRange, "Movements.world");
   Refused<M>(good, [](M& m) { m.part = 1; }, kRange, "Movements.part");
   Refused<M>(good, [](M& m) { m.parts = 0; }, kRange, "Movements.parts");

@@ -129,6 +129,30 @@ class CppTest(unittest.TestCase):
                      "  bool visible = true;", "using Message = std::variant<Paint>;"):
             self.assertIn(line, header)
 
+    def test_borrows_and_reverses_lists(self):
+        cpp = Cpp(read("""table Batch (reversed) {
+          ids: [uint] (borrowed, keep_empty, max: "4");
+          bytes: [ubyte] (bytes, keep_empty: "ids", max: "9");
+        }"""))
+        self.assertIn("std::span<const std::uint32_t> ids;\n  std::vector<std::byte> bytes;\n};",
+                      cpp.structs_header())
+        self.assertIn("u.Borrow(w.ids(), {0, 4, ", cpp.codec_source())
+        self.assertIn("const auto bytes = ScalarList(b, m.bytes, !m.ids.empty());\n"
+                      "  const auto ids = ScalarList(b, m.ids, true);", cpp.codec_source())
+
+    def test_writes_structs_of_groups(self):
+        header = Cpp(read("""table Spawn {
+          /// Where it stands.
+          x_m: double (cpp: "start.x_m", group: "Start");
+          /// Not wrapped.
+          heading_rad: double (cpp: "start.heading_rad");
+        }
+        table Moved { x_m: double (cpp: "to.x_m", group: "Start"); }""")).structs_header()
+        self.assertEqual(header.count("/// Where it stands.\nstruct Start {\n  double x_m = 0.0;\n"
+                                      "  /// Not wrapped.\n  double heading_rad = 0.0;\n"), 1)
+        self.assertEqual(header.count("struct Start"), 1)
+        self.assertIn("  Start to;", header)
+
     def test_writes_json(self):
         source = CppJson(read(SMALL)).source()
         self.assertIn('json["seq"] = Value(m.seq);', source)

@@ -70,11 +70,12 @@ TEST(PoseBatchComposer, ContainsThePickedRows) {
     EXPECT_EQ(decoded.batch.info, Info(mode));
     EXPECT_THAT(decoded.batch.avatars, ElementsAre(10, 40, 50, 60, 210, 400));
     EXPECT_THAT(decoded.batch.flags, ElementsAre(0, 3, 4, 5, 20, 39));
-    for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
+    PoseBatchReader reader(decoded.batch, nullptr);
+    for (const AvatarId avatar : decoded.batch.avatars) {
       Vec3 root;
       std::vector<Quat> rotations(kJoints);
-      ASSERT_TRUE(DecodePose(mode, decoded.batch.pose(i), root, rotations));
-      EXPECT_EQ(root.x, RootOf(decoded.batch.avatars[i]).x);
+      ASSERT_TRUE(DecodePose(mode, reader.Next(), root, rotations));
+      EXPECT_EQ(root.x, RootOf(avatar).x);
       EXPECT_NEAR(rotations.back().y, YawRotation(0.25).y, 3e-5);
     }
     EXPECT_TRUE(Decoded(composer, rows, {}).batch.avatars.empty());

@@ -11,6 +11,7 @@
 #include "app/world_directory.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/decode.h"
+#include "stridewire/protocol/pose_batch_reader.h"
 #include "test_library.h"
 #include "world/command_inbox.h"
 
@@ -208,11 +209,12 @@ TEST(WorldShard, PlaysLayersLikeASingleAvatar) {
         PoseDelivery delivery;
         ASSERT_TRUE(shard->Encode(PoseMode::kFull, tick, true, composer, delivery));
         const Decoded decoded(delivery.parts.at(0));
-        for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
-          const ConstPoseSpan expected = alone[decoded.batch.avatars[i] - 1].pose();
+        protocol::PoseBatchReader reader(decoded.batch, nullptr);
+        for (const AvatarId avatar : decoded.batch.avatars) {
+          const ConstPoseSpan expected = alone[avatar - 1].pose();
           Pose pose(library->skeleton().joint_count());
-          ASSERT_TRUE(protocol::DecodePose(PoseMode::kFull, decoded.batch.pose(i),
-                                           pose.root_position_m, pose.rotations));
+          ASSERT_TRUE(protocol::DecodePose(PoseMode::kFull, reader.Next(), pose.root_position_m,
+                                           pose.rotations));
           ASSERT_TRUE(std::ranges::equal(pose.rotations, expected.rotations)) << tick;
         }
       }
@@ -454,9 +456,10 @@ std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayDelayedCrowd(int sha
       PoseDelivery delivery;
       EXPECT_TRUE(shard.Encode(PoseMode::kFull, tick, true, composer, delivery));
       const Decoded decoded(delivery.parts.at(0));
-      for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
-        const auto pose = decoded.batch.pose(i);
-        poses[decoded.batch.avatars[i]].emplace_back(pose.begin(), pose.end());
+      protocol::PoseBatchReader reader(decoded.batch, nullptr);
+      for (const AvatarId avatar : decoded.batch.avatars) {
+        const auto pose = reader.Next();
+        poses[avatar].emplace_back(pose.begin(), pose.end());
       }
     }
   }
