@@ -87,7 +87,9 @@ class Cpp:
             return f'found.Known({value}, {number}, {at}, "expected a number from 0 to {number}");'
         if "nonzero" in f:
             return f"found.NonZero({value}, {at});"
-        above, below, low, high = (f.get(name) for name in ("above", "below", "min", "max"))
+        above, below, low, high = (
+            value if value and self.schema.is_constant(value) else None
+            for value in (f.get(name) for name in ("above", "below", "min", "max")))
         if self.is_float(f):
             if above is not None:
                 return f'found.Above({value}, {above}, {at}, "expected a number above {above}");'
@@ -132,9 +134,35 @@ class Cpp:
         line = None if f.type == "bool" or "status" in f else self.number_check(f, m)
         return [line] if line else []
 
+    def relations(self, f, table):
+        """Checks of a field that depend on other fields of the table."""
+        fields = {each.name: each for each in table.fields}
+        m, at, lines = self.member(f), self.at(f), []
+        for bound, sign, words in (("max", "<=", "at most"), ("below", "<", "a number below")):
+            if other := fields.get(f.get(bound)):
+                lines.append(f'found.That({m} {sign} {self.member(other)}, {at}, {m}, '
+                             f'"expected {words} {other.name}");')
+        if low := f.get("min_or_none"):
+            expected = (f"expected {self.text_of(low)} to {self.text_of(f.get('max'))} bytes, "
+                        "or none")
+            lines.append(f"found.That({m}.empty() || {m}.size() >= {self.bound(low)}, {at}, "
+                         f'{m}.size(), "{expected}", ErrorCode::kLimitExceeded);')
+        if other := fields.get(f.get("per")):
+            lines.append(f"found.That({m}.size() == {self.member(other)}.size(), {at}, {m}.size(), "
+                         f'"expected one entry per {other.name[:-1]}", ErrorCode::kShapeMismatch);')
+        if other := fields.get(f.get("requires")):
+            lines.append(f"found.That(!{m} || {self.member(other)}, ErrorCode::kMalformed, "
+                         f'"{f.name} requires a {other.name}", {at});')
+        other = fields.get(f.get("without"))
+        if other is not None and f.type == other.type == "bool":
+            lines.append(f"found.That(!{m} || !{self.member(other)}, ErrorCode::kMalformed, "
+                         f'"{other.name} excludes {f.get("cpp", f.name)}", {self.at(other)});')
+        return lines
+
     def check_function(self, table):
         fields = self.common_fields(table) if "variant" in table else table.fields
         lines = [self.used_if(f, "m.{}") + line for f in fields for line in self.check(f)]
+        lines += [line for f in fields for line in self.relations(f, table)]
         if "variant" in table:
             lines.append("std::visit([&](const auto& used) { CheckFields(found, at, used); }, "
                          f"{self.variant(table)});")

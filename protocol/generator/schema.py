@@ -18,8 +18,8 @@ TABLE_ATTRIBUTES = {
 FIELD_ATTRIBUTES = {
     "above", "below", "borrowed", "bytes", "cpp", "deprecated", "early", "enumerators", "group",
     "initial", "inverted", "json_array", "json_omit", "json_place", "keep_empty", "max", "min",
-    "needed", "nonzero", "number", "omit_zero", "only", "optional", "shared", "status", "web",
-    "with", "without",
+    "min_or_none", "needed", "nonzero", "number", "omit_zero", "only", "optional", "per",
+    "requires", "shared", "status", "web", "with", "without",
 }
 ENUM_ATTRIBUTES = {"cpp", "handwritten"}
 
@@ -102,6 +102,10 @@ class Schema:
     def number(self, value):
         """The value of a bound: a number, or the name of a limit."""
         return int(self.limits[value].default) if value in self.limits else float(value)
+
+    def is_constant(self, value):
+        """Whether a bound is a number or a limit. Otherwise it is a field of the same table."""
+        return value in self.limits or bool(re.fullmatch(r"-?\d+(\.\d+)?", value))
 
     def is_struct(self, type_name):
         return type_name in self.tables and self.tables[type_name].is_struct
@@ -223,12 +227,14 @@ class Schema:
     def _check(self):
         for table in self.tables.values():
             for f in table.all_fields:
-                self._check_field(f, f"{table.name}.{f.name}")
-                for other in (f.get("with"), f.get("without"), f.get("keep_empty")):
-                    if other and other not in [each.name for each in table.fields]:
+                self._check_field(f, f"{table.name}.{f.name}", table)
+                names = [each.name for each in table.fields]
+                for attribute in ("with", "without", "keep_empty", "per", "requires"):
+                    other = f.get(attribute)
+                    if other and other not in names:
                         self.fail(f.line, f"{table.name}.{f.name}: there is no field '{other}'")
 
-    def _check_field(self, f, where):
+    def _check_field(self, f, where, table):
         is_object = f.type in self.tables
         if not (f.type in SCALARS or f.type in self.enums or is_object or f.type == "string"):
             self.fail(f.line, f"{where}: unknown type '{f.type}'")
@@ -241,13 +247,15 @@ class Schema:
             self.fail(f.line, f"{where}: 'min' and 'max' do not apply to a table or struct")
         if f.get("enumerators") and f.get("enumerators") not in self.enums:
             self.fail(f.line, f"{where}: unknown enum '{f.get('enumerators')}'")
-        for bound in ("min", "max", "above", "below"):
+        for bound in ("min", "max", "above", "below", "min_or_none"):
             value = f.get(bound)
             if value is None:
                 continue
             if f.type in self.enums and not f.is_list:
                 if value not in self.enums[f.type].values:
                     self.fail(f.line, f"{where}: {bound}: {f.type} has no enumerator '{value}'")
-            elif value not in self.limits and not re.fullmatch(r"-?\d+(\.\d+)?", value):
+            elif not self.is_constant(value) and (
+                    f.is_list or bound not in ("max", "below") or
+                    value not in [each.name for each in table.fields]):
                 self.fail(f.line, f"{where}: {bound}: expected a number or a field of Limits, "
                                   f"got '{value}'")

@@ -13,11 +13,6 @@
 namespace stridewire::protocol {
 namespace {
 
-void CheckResumeToken(Findings& found, const FieldPath& at, const std::vector<std::byte>& token) {
-  found.That(token.empty() || token.size() >= kMinResumeTokenBytes, At(at, "resume_token"),
-             token.size(), "expected 16 to 64 bytes, or none", ErrorCode::kLimitExceeded);
-}
-
 void CheckRings(Findings& found, const FieldPath& at, const Observe& m) {
   const Region& region = *m.region;
   const FieldPath rings = At(at, "rings");
@@ -35,38 +30,9 @@ void CheckRings(Findings& found, const FieldPath& at, const Observe& m) {
              "levels of detail require mode 1 (quantised)", At(at, "ring_details"));
 }
 
-/// Checks that a list has one entry per avatar.
-void CheckOnePerAvatar(Findings& found, const FieldPath& at, std::size_t count,
-                       std::size_t avatars) {
-  found.That(count == avatars, at, count, "expected one entry per avatar",
-             ErrorCode::kShapeMismatch);
-}
-
-void CheckPart(Findings& found, const FieldPath& at, std::uint16_t part, std::uint16_t parts) {
-  found.That(part < parts, At(at, "part"), part, "expected a number below parts");
-}
-
 }  // namespace
 
-void CheckMeaning(Findings& found, const FieldPath& at, const Hello& m) {
-  found.That(m.protocol_min <= m.protocol_max, At(at, "protocol_min"), m.protocol_min,
-             "expected at most protocol_max");
-  CheckResumeToken(found, at, m.resume_token);
-}
-
-void CheckMeaning(Findings& found, const FieldPath& at, const Welcome& m) {
-  CheckResumeToken(found, at, m.resume_token);
-}
-
-void CheckMeaning(Findings& found, const FieldPath& at, const RequestItem& m) {
-  const auto* step = std::get_if<StepMovement>(&m.movement);
-  found.That(step == nullptr || !step->exact_only || !step->allow_nearest, ErrorCode::kMalformed,
-             "exact_only excludes allow_nearest", At(at, "exact_only"));
-}
-
 void CheckMeaning(Findings& found, const FieldPath& at, const Observe& m) {
-  found.That(m.region || !m.replace, ErrorCode::kMalformed, "replace requires a region",
-             At(at, "replace"));
   found.That(m.detail == PoseDetail::kAll || m.mode == PoseMode::kQuantised,
              ErrorCode::kUnsupported, "levels of detail require mode 1 (quantised)",
              At(at, "detail"));
@@ -154,11 +120,8 @@ std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch) {
 
 void CheckMeaning(Findings& found, const FieldPath& at, const PoseBatch& m) {
   const PoseBatchInfo& info = m.info;
-  CheckPart(found, at, info.part, info.parts);
   found.That(info.mode != PoseMode::kMovement, ErrorCode::kUnsupported,
              "mode 2 (movement) has no poses", At(at, "mode"));
-  CheckOnePerAvatar(found, At(at, "flags"), m.flags.size(), m.avatars.size());
-  if (!found.ok()) return;
   const bool has_all =
       IsCompact(info.mode)
           ? CompactPoseBytes(m).has_value()
@@ -199,9 +162,6 @@ void CheckMeaning(Findings& found, const FieldPath& at, const AvatarState& m) {
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const Movements& m) {
-  CheckPart(found, at, m.part, m.parts);
-  CheckOnePerAvatar(found, At(at, "flags"), m.flags.size(), m.avatars.size());
-  CheckOnePerAvatar(found, At(at, "ends"), m.ends.size(), m.avatars.size());
   const FieldPath ends = At(at, "ends");
   std::uint32_t before = 0;
   for (std::size_t i = 0; i < m.ends.size(); ++i) {

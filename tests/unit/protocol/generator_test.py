@@ -83,6 +83,7 @@ class SchemaTest(unittest.TestCase):
             "union U { A, B }": "small.fbs:1: expected a table, struct or enum, got 'union U'",
             "table A {\n  x: [string] (max: \"2\");\n}": "small.fbs:2: A.x: lists of strings",
             "table A {\n  x: uint;": "small.fbs:2: the declaration does not end",
+            "table A {\n  x: uint (below: \"y\");\n}": "small.fbs:2: A.x: below: expected a number",
             "table A {\n  x: uint (with: \"y\");\n}": "small.fbs:2: A.x: there is no field 'y'",
         }
         for text, expected in cases.items():
@@ -106,6 +107,29 @@ class CppTest(unittest.TestCase):
                 'if (m.speed_m_s) found.AtLeast(*m.speed_m_s, 0, At(at, "speed_m_s"), '
                 '"expected a number of at least 0");'):
             self.assertIn(line, self.source)
+
+    def test_checks_relations_between_fields(self):
+        source = Cpp(read("""table Batch {
+          part: ushort (below: "parts");
+          parts: ushort;
+          ids: [uint] (max: "4");
+          flags: [ubyte] (per: "ids", max: "4");
+          token: [ubyte] (bytes, min_or_none: "16", max: "64");
+          place: Place (optional);
+          moves: bool (requires: "place");
+          exact: bool;
+          near: bool (without: "exact");
+        }
+        table Place { x: double; }""")).codec_source()
+        for line in (
+                'm.part < m.parts, At(at, "part"), m.part, "expected a number below parts");',
+                'm.flags.size() == m.ids.size(), At(at, "flags"), m.flags.size(), '
+                '"expected one entry per id", ErrorCode::kShapeMismatch);',
+                'm.token.empty() || m.token.size() >= 16, At(at, "token"), m.token.size(), '
+                '"expected 16 to 64 bytes, or none", ErrorCode::kLimitExceeded);',
+                '!m.moves || m.place, ErrorCode::kMalformed, "moves requires a place", ',
+                '!m.near || !m.exact, ErrorCode::kMalformed, "exact excludes near", '):
+            self.assertIn("found.That(" + line, source)
 
     def test_decodes_and_encodes_renamed_and_inverted_members(self):
         self.assertIn("m.visible = !w.hidden();", self.source)
