@@ -163,6 +163,8 @@ class Cpp:
         fields = self.common_fields(table) if "variant" in table else table.fields
         lines = [self.used_if(f, "m.{}") + line for f in fields for line in self.check(f)]
         lines += [line for f in fields for line in self.relations(f, table)]
+        if "native" in table:
+            lines = [f"found.AreFinite(at, {', '.join(self.member(f) for f in fields)});"]
         if "variant" in table:
             lines.append("std::visit([&](const auto& used) { CheckFields(found, at, used); }, "
                          f"{self.variant(table)});")
@@ -521,7 +523,7 @@ class Cpp:
     def codec_header(self):
         lines = []
         for t in self.schema.tables.values():
-            if "native" in t:
+            if t.by_hand("encode"):
                 continue
             name = self.type_name(t.name)
             for alternative in self.schema.alternatives(t) if "variant" in t else []:
@@ -538,7 +540,7 @@ class Cpp:
     def codec_source(self):
         parts = []
         for t in self.schema.tables.values():
-            if "native" in t:
+            if t.by_hand("encode"):
                 continue
             if "variant" in t:
                 parts += [self.check_function(each) for each in self.schema.alternatives(t)]

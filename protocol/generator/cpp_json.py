@@ -6,7 +6,7 @@ from cpp import Cpp
 class CppJson(Cpp):
     def value(self, f):
         m = self.member(f)
-        if "json_array" in f:
+        if f.get("json_array") == "":
             parts = self.schema.tables[f.type].fields
             return "Json::array({" + ", ".join(f"{m}.{part.name}" for part in parts) + "})"
         return f"!{m}" if "inverted" in f else f"Value({m})"
@@ -37,6 +37,8 @@ class CppJson(Cpp):
             condition = self.used_if(f, "m.{}") + self.condition(f)
             if "variant" in table and f.name == "type":
                 lines.append(f'json["type"] = {self.variant(table)}.index();')
+            elif f.get("json_array"):
+                lines.append(f'json["{f.get("json_array")}"].push_back({self.value(f)});')
             elif "variant" not in table or "only" not in f:
                 lines.append(f'{condition}json["{f.name}"] = {self.value(f)};')
         if "variant" in table:
@@ -46,7 +48,7 @@ class CppJson(Cpp):
 
     def parse(self, f):
         m = self.member(f)
-        if "json_array" in f:
+        if f.get("json_array") == "":
             parts = self.schema.tables[f.type].fields
             return [f'json.at("{f.name}").at({i}).get_to({m}.{part.name});'
                     for i, part in enumerate(parts)]
@@ -57,7 +59,14 @@ class CppJson(Cpp):
     def parse_function(self, table):
         signature = f"void FromJson(const Json& json, {self.type_name(table.name)}& m)"
         fields = self.common_fields(table) if "variant" in table else table.fields
-        lines = [line for f in fields for line in self.parse(f)]
+        arrays = {}
+        lines = []
+        for f in fields:
+            if name := f.get("json_array"):
+                position = arrays[name] = arrays.get(name, -1) + 1
+                lines.append(f'FromJson(json.at("{name}").at({position}), {self.member(f)});')
+            else:
+                lines += self.parse(f)
         if "variant" in table:
             lines.append('switch (json.at("type").get<int>()) {')
             for number, each in enumerate(self.schema.alternatives(table)):
@@ -65,6 +74,19 @@ class CppJson(Cpp):
                 lines.append(f"  case {number}: FromJson(json, {target}); break;")
             lines.append("}")
         return self.function(signature, lines)
+
+    def array_functions(self, table):
+        """The functions of a vector or quaternion: name and lines of each."""
+        name = self.type_name(table.name)
+        members = [self.member(f) for f in table.fields]
+        return {f"Json Value(const {name}& m)": [f"return Json::array({{{', '.join(members)}}});"],
+                f"void FromJson(const Json& json, {name}& m)":
+                    [f"json.at({i}).get_to({m});" for i, m in enumerate(members)]}
+
+    @property
+    def arrays(self):
+        return [t for t in self.schema.tables.values()
+                if "native" in t and not t.by_hand("json")]
 
     def is_alone(self, table):
         return self.member(table.fields[0]) == "m"
@@ -80,11 +102,15 @@ class CppJson(Cpp):
         declarations = "".join(f"[[nodiscard]] Json Fields(const {self.type_name(t.name)}& m);\n"
                                f"void FromJson(const Json& json, {self.type_name(t.name)}& m);\n"
                                for t in self.objects)
+        declarations += "".join(f"{signature};\n" for t in self.arrays
+                                for signature in self.array_functions(t))
         return (self.head() + "#pragma once\n\nnamespace stridewire::protocol {\n\n" +
                 declarations + "\n}  // namespace stridewire::protocol\n")
 
     def source(self):
-        functions = "\n".join(self.json_function(t) + "\n" + self.parse_function(t)
+        functions = "".join(self.function(signature, lines) + "\n" for t in self.arrays
+                            for signature, lines in self.array_functions(t).items())
+        functions += "\n".join(self.json_function(t) + "\n" + self.parse_function(t)
                               for t in self.objects if not t.by_hand("json"))
         return (self.head() + '#include "json_support.h"\n\nnamespace stridewire::protocol {\n\n' +
                 functions + "\n}  // namespace stridewire::protocol\n")

@@ -165,7 +165,9 @@ class TypeScript:
         if "bytes" in f:
             rules["bytes"] = True
         table = self.schema.tables.get(f.type)
-        if "json_array" in f or (table is not None and "native" in table):
+        if group := f.get("json_array"):
+            rules["group"] = group
+        elif "json_array" in f or (table is not None and "native" in table):
             rules["array"] = True
         return rules
 
@@ -182,6 +184,8 @@ export interface JsonField {
   readonly bytes?: boolean;
   /** The struct is an array of its numbers. */
   readonly array?: boolean;
+  /** The fields of the same group are an array of this name. */
+  readonly group?: string;
 }
 
 /** The fields of each table, in the order of `tables`. */

@@ -21,38 +21,11 @@ using flatbuffers::Offset;
 
 #include "codec.h"
 
-/// Functions that the generated code (codec.cpp) calls: they convert types of core and GLM, and
-/// lists. The schema's attributes name the cases; protocol/generator/README.md explains them.
+/// Functions that the generated code (codec.cpp) calls, mostly for lists. The schema's attributes
+/// name the cases; protocol/generator/README.md explains them.
 namespace stridewire::protocol {
 
-// ---- vectors and quaternions
-
-inline wire::Vec3 ToWire(const DVec3& v) { return {v.x, v.y, v.z}; }
-inline wire::Offset ToWire(const Vec3& v) { return {v.x, v.y, v.z}; }
-inline wire::Rotation ToWire(const Quat& q) { return {q.x, q.y, q.z, q.w}; }
 inline bool IsZero(const DVec3& v) { return v == DVec3(0.0); }
-
-inline void Unpack(Unpacker&, const FieldPath&, const wire::Vec3& w, DVec3& v) {
-  v = DVec3(w.x(), w.y(), w.z());
-}
-inline void Unpack(Unpacker&, const FieldPath&, const wire::Offset& w, Vec3& v) {
-  v = Vec3(w.x(), w.y(), w.z());
-}
-inline void Unpack(Unpacker&, const FieldPath&, const wire::Rotation& w, Quat& q) {
-  q = Quat(w.w(), w.x(), w.y(), w.z());
-}
-
-inline void CheckFields(Findings& found, const FieldPath& at, const DVec3& v) {
-  found.AreFinite(at, v.x, v.y, v.z);
-}
-inline void CheckFields(Findings& found, const FieldPath& at, const Vec3& v) {
-  found.AreFinite(at, v.x, v.y, v.z);
-}
-inline void CheckFields(Findings& found, const FieldPath& at, const Quat& q) {
-  found.AreFinite(at, q.x, q.y, q.z, q.w);
-}
-
-// ---- lists
 
 void CheckList(Findings& found, const ParameterSet& set, const Bounds& bounds, const FieldPath& at);
 template <typename T>

@@ -19,7 +19,6 @@ using Json = nlohmann::ordered_json;
 // numbers, and opaque bytes hexadecimal digits.
 
 [[nodiscard]] inline Json Value(std::uint64_t value) { return std::to_string(value); }
-[[nodiscard]] Json Value(const Quat& q);
 [[nodiscard]] Json Value(const std::vector<std::byte>& bytes);
 [[nodiscard]] Json Value(const ParameterSet& set);
 [[nodiscard]] inline Json Value(const std::string& text) { return text; }
@@ -32,11 +31,6 @@ template <typename E>
   requires std::is_enum_v<E>
 [[nodiscard]] Json Value(E value) {
   return static_cast<int>(value);
-}
-template <typename V>
-  requires std::is_same_v<V, Vec3> || std::is_same_v<V, DVec3>
-[[nodiscard]] Json Value(const V& v) {
-  return Json::array({v.x, v.y, v.z});
 }
 
 // FromJson is the reverse of Fields. It throws the exceptions of nlohmann::json for JSON of another
@@ -57,14 +51,8 @@ void FromJson(const Json& json, E& out) {
   out = static_cast<E>(json.get<std::underlying_type_t<E>>());
 }
 inline void FromJson(const Json& json, std::string& out) { json.get_to(out); }
-void FromJson(const Json& json, Quat& q);
 void FromJson(const Json& json, std::vector<std::byte>& out);
 void FromJson(const Json& json, ParameterSet& set);
-template <typename V>
-  requires std::is_same_v<V, Vec3> || std::is_same_v<V, DVec3>
-void FromJson(const Json& json, V& v) {
-  for (int i = 0; i < 3; ++i) json.at(static_cast<std::size_t>(i)).get_to(v[i]);
-}
 
 }  // namespace stridewire::protocol
 

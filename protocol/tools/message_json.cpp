@@ -12,8 +12,6 @@
 
 namespace stridewire::protocol {
 
-Json Value(const Quat& q) { return Json::array({q.x, q.y, q.z, q.w}); }
-
 Json Value(const std::vector<std::byte>& bytes) {
   static constexpr char kDigits[] = "0123456789abcdef";
   std::string text;
@@ -22,16 +20,6 @@ Json Value(const std::vector<std::byte>& bytes) {
     text += kDigits[std::to_integer<int>(b) & 15];
   }
   return text;
-}
-
-Json Fields(const RotationQuantization& m) {
-  const Quat& q = m.reference;
-  return {{"reference", Json::array({q.x, q.y, q.z, q.w})},
-          {"low", Value(m.low)},
-          {"step", Value(m.step)},
-          {"bits", m.bits},
-          {"smallest_three_bits", m.smallest_three_bits},
-          {"least_w", m.least_w}};
 }
 
 Json Value(const ParameterSet& set) {
@@ -84,20 +72,6 @@ void FromJson(const Json& json, std::vector<std::byte>& out) {
   for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
     out.push_back(static_cast<std::byte>(std::stoi(text.substr(i, 2), nullptr, 16)));
   }
-}
-
-void FromJson(const Json& json, RotationQuantization& m) {
-  const std::vector<float> q = json.at("reference");
-  m.reference = Quat(q.at(3), q.at(0), q.at(1), q.at(2));
-  Get(json, "low", m.low);
-  Get(json, "step", m.step);
-  json.at("bits").get_to(m.bits);
-  Get(json, "smallest_three_bits", m.smallest_three_bits);
-  Get(json, "least_w", m.least_w);
-}
-
-void FromJson(const Json& json, Quat& q) {
-  q = Quat(json.at(3), json.at(0), json.at(1), json.at(2));
 }
 
 void FromJson(const Json& json, PoseBatch& m) {

@@ -178,7 +178,11 @@ class CppTest(unittest.TestCase):
         self.assertIn("  Start to;", header)
 
     def test_writes_json(self):
-        source = CppJson(read(SMALL)).source()
+        source = CppJson(read(SMALL + 'struct A { x: ubyte (json_array: "xy"); '
+                              'y: ubyte (json_array: "xy"); }')).source()
+        self.assertIn('json["xy"].push_back(Value(m.x));\n'
+                      '  json["xy"].push_back(Value(m.y));', source)
+        self.assertIn('FromJson(json.at("xy").at(1), m.y);', source)
         self.assertIn('json["seq"] = Value(m.seq);', source)
         self.assertIn('json["hidden"] = !m.visible;', source)
         self.assertIn('m.visible = !json.value("hidden", false);', source)

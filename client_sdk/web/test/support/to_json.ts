@@ -34,11 +34,10 @@ function convertTable(table: number, value: Fields): Fields {
     const rules = jsonFields[table]![i]!;
     const member = convert(field, value[field.name], rules);
     const decides = rules.omit ? value[rules.omit] : member;
-    if (rules.omit === undefined || !isEmpty(decides)) json[rules.name] = member;
+    if (rules.group) json[rules.group] = [...(json[rules.group] ?? []) as unknown[], member];
+    else if (rules.omit === undefined || !isEmpty(decides)) json[rules.name] = member;
   });
-  if (info.name !== 'RotationQuantization') return json;
-  const {bits_x: x, bits_y: y, bits_z: z, ...others} = json;
-  return {...others, bits: [x, y, z]};
+  return json;
 }
 
 function isEmpty(value: unknown): boolean {
