@@ -71,15 +71,15 @@ export class WorldHandle implements World {
   }
 
   spawn(items: readonly SpawnItem[]): Promise<Reply> {
-    return this.session.command(this, () => commands.spawn(items));
+    return this.session.command(this, () => ({type: 'Spawn', items}));
   }
 
   remove(avatars: readonly number[]): Promise<Reply> {
-    return this.session.command(this, () => commands.remove(avatars));
+    return this.session.command(this, () => ({type: 'Remove', avatars}));
   }
 
   cancel(avatars: readonly number[]): Promise<Reply> {
-    return this.session.command(this, () => commands.cancelQueue(avatars));
+    return this.session.command(this, () => ({type: 'CancelQueue', avatars}));
   }
 
   request(items: readonly MovementRequest[]): Promise<Reply> {
@@ -96,7 +96,7 @@ export class WorldHandle implements World {
   }
 
   setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply> {
-    return this.session.command(this, () => commands.setPlanting(avatars, enabled));
+    return this.session.command(this, () => ({type: 'SetPlanting', avatars, enabled}));
   }
 
   observe(observation: Observation): Subscription {

@@ -1,6 +1,4 @@
-import type {
-  LayerRequest, MovementRequest, Observation, Region, SpawnItem, Terrain
-} from '../types';
+import type {LayerRequest, MovementRequest, Observation, Region, Terrain} from '../types';
 import type {PoseDetail, Region as RegionEntry} from '../../generated/messages';
 import {Malformed} from './malformed';
 import type {Draft} from './write';
@@ -21,18 +19,6 @@ function convert<T, U>(items: readonly T[], field: string, entry: (item: T) => U
     }
     return entry(item);
   });
-}
-
-export function spawn(items: readonly SpawnItem[]): Draft {
-  return {type: 'Spawn', items};
-}
-
-export function remove(avatars: readonly number[]): Draft {
-  return {type: 'Remove', avatars};
-}
-
-export function cancelQueue(avatars: readonly number[]): Draft {
-  return {type: 'CancelQueue', avatars};
 }
 
 /** Calls `nextId` for the id of each request that has none. */
@@ -67,10 +53,6 @@ export function setLayers(items: readonly LayerRequest[]): Draft {
       return {...item, fadeOut: !enabled};
     }),
   };
-}
-
-export function setPlanting(avatars: readonly number[], enabled: boolean): Draft {
-  return {type: 'SetPlanting', avatars, enabled};
 }
 
 export type ObserveDraft = Draft & {
