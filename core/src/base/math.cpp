@@ -58,20 +58,16 @@ Quat SlerpFromIdentity(const Quat& q, float fraction) {
 }
 
 double AngleBetween(const Quat& a, const Quat& b) {
-  const DQuat from(a);
-  const DQuat to = glm::dot(from, DQuat(b)) < 0.0 ? -DQuat(b) : DQuat(b);
-  const DQuat difference = to - from;
-  const double x2 = 0.25 * glm::dot(difference, difference);
-  // Most angles are small: between successive frames, for example. The angle is 4 asin(x), where x
-  // is half the distance of the quaternions. Up to x = 0.1 the next term is less than 3e-12 rad.
-  if (x2 < 0.01) {
-    constexpr double kTerms[] = {1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0, 35.0 / 1152.0};
-    const double series =
-        1.0 + x2 * (kTerms[0] + x2 * (kTerms[1] + x2 * (kTerms[2] + x2 * kTerms[3])));
-    return 4.0 * std::sqrt(x2) * series;
-  }
-  const DQuat d = glm::conjugate(from) * to;
-  return 2.0 * Atan2(std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z), std::fabs(d.w));
+  const DQuat d = glm::conjugate(DQuat(a)) * DQuat(b);
+  const double s2 = d.x * d.x + d.y * d.y + d.z * d.z;
+  const double w2 = d.w * d.w;
+  if (s2 >= 0.01 * w2) return 2.0 * Atan2(std::sqrt(s2), std::fabs(d.w));
+  // Most angles are small: those between successive frames, for example. The angle is 2 atan(t).
+  // Up to t = 0.1, the first term that is left out is less than 1e-14 rad.
+  const double t2 = s2 / w2;
+  constexpr double k[] = {-1.0 / 3.0, 1.0 / 5.0, -1.0 / 7.0, 1.0 / 9.0, -1.0 / 11.0, 1.0 / 13.0};
+  return 2.0 * std::sqrt(t2) *
+         (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * (k[3] + t2 * (k[4] + t2 * k[5]))))));
 }
 
 }  // namespace stridewire
