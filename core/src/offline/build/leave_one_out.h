@@ -31,7 +31,7 @@ struct LeftOutMean {
   double planted_m = 0.0;
   double foot_m = 0.0;     ///< Distance of the ball of the moving foot, or of both balls in a jump.
   double keytime_s = 0.0;  ///< Difference between keytimes, except the first.
-  /// Largest difference between a requested and a synthesized parameter.
+  /// Largest difference between the requested and synthesized parameters of a movement.
   double parameter_m = 0.0;
 };
 

@@ -25,7 +25,7 @@ constexpr double kElbowLag = 0.17;
 
 double Mix(double a, double b, double s) { return a + (b - a) * s; }
 
-// A quantity that oscillates about `middle`. Its values depend on the state.
+// The oscillation of an angle about `middle`, for one gait state.
 struct Oscillation {
   double middle = 0.0;
   double amplitude = 0.0;

@@ -148,7 +148,8 @@ std::optional<StandParts> MeasureStandParts(const RawLibrary& library) {
       if (point == kPointsPerInterval * 3 / 2) average.AddSole(fixed, sample);
     });
   }
-  // If the same foot moves in all steps, its sole is flat only after it has landed.
+  // If the same foot moves in all steps, it is never the fixed foot. Its sole is then measured at
+  // the end of the steps, after it has landed.
   for (const RawGroup& group : library.groups) {
     if (!IsCapturedStep(group) || average.has_sole(MovingFoot(group.kind))) continue;
     ForEachSample(library.skeleton, group, [&](std::size_t point, const PostureSample& sample) {

@@ -140,7 +140,7 @@ class StepGenerator {
   };
   struct Moment {
     double generic = 0.0;
-    DVec3 root_m = DVec3(0.0);  // Root before it is lowered into the reach of the legs.
+    DVec3 root_m = DVec3(0.0);  // Root before it is lowered so that the legs reach the feet.
     Pose posture;               // Pose before inverse kinematics, with the root at the origin.
     std::array<Leg, 2> legs;    // [Foot]
   };
@@ -246,7 +246,7 @@ class StepGenerator {
     root_.duration_s = end_s_;
   }
 
-  // Returns the root before it is lowered into the reach of the legs.
+  // Returns the root before it is lowered so that the legs reach the feet.
   [[nodiscard]] DVec3 RootAt(double time_s, const PostureSample& stride) const {
     const double generic = GenericAt(time_s);
     const double share = std::min(1.0, ShareAt(time_s));

@@ -14,9 +14,9 @@ namespace stridewire {
 namespace {
 
 constexpr double kHalfSupportDefaultS = 0.08;
-// Half of a double support lasts at least this time, or else the swing includes part of it. Between
-// keytimes that are closer, the grid of a library would be much finer than elsewhere, and blends
-// would jerk there.
+// Minimum duration of half a double support. If it is shorter, the keytimes of toe-off and
+// heel-strike are moved into the swing. Between keytimes that are closer, the grid of a library
+// would be much finer than elsewhere, and blends would jerk there.
 constexpr double kHalfSupportMinS = 0.02;
 // If a recording begins or ends during a double support, at least this fraction of the usual half
 // of a double support must be recorded.

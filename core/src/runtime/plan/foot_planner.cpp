@@ -62,8 +62,8 @@ constexpr double kMaxPushM = 0.08;
 constexpr std::array<double, 2> kEarlySamples{0.1, 0.18};
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
-// Fractions of the time before release, and of the swing shortly before landing, at which the
-// moving foot is sampled.
+// The moving foot is also sampled at these fractions of the time before its release, and at these
+// fractions of its swing, shortly before the landing.
 constexpr std::array<double, 2> kReleaseSamples{0.6, 0.8};
 constexpr std::array<double, 3> kLandingSamples{0.9, 0.94, 0.97};
 // A landing foot may briefly be this far below the ground.
@@ -444,7 +444,7 @@ class Planner {
   }
 
   // Returns by how much the root must be lower at the end of the movement, so that both legs reach
-  // their footprints. The root then descends during the whole movement. Otherwise, planting would
+  // their footprints. The root then descends gradually (RootSinkShare). Otherwise, planting would
   // lower it abruptly just before the foot lands on a lower tread.
   double RootSink(Foot moving) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
@@ -457,8 +457,9 @@ class Planner {
           trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
       const double share = RootSinkShare(time_s / movement_.duration_s());
       sink_m = std::max(sink_m, MissingReach(time_s, moving, kLongestExtension) / share);
-      // If the foot lands long before the end of the movement, the root descends further after the
-      // landing. A bent knee is only a preference, so it does not increase this descent as much.
+      // If the foot lands long before the end of the movement, `share` is small, so the root would
+      // descend much further after the landing. For a bent knee, which is only a preference, the
+      // share counts as at least kLeastShare.
       if (part < kBentLanding) continue;
       sink_m = std::max(sink_m, MissingReach(time_s, moving, bent) / std::max(share, kLeastShare));
     }

@@ -455,7 +455,8 @@ WalkStance After(const WalkStance& stance, const PlannedStep& step) {
   return after;
 }
 
-// Compares steps by the effort that remains after them and after the next step of the other foot.
+// Compares steps by the remaining effort of the walk, after the step itself and after the following
+// step of the other foot.
 class StepComparison {
  public:
   StepComparison(const MotionLibrary& library, const Terrain* terrain, const WalkRequest& walk,

@@ -12,7 +12,7 @@
 namespace stridewire {
 namespace {
 
-// The arithmetic for foot_correction-inl.h, with doubles.
+// Functions that foot_correction-inl.h calls, for double.
 template <typename Number>
 constexpr Number Constant(double value) {
   return value;

@@ -113,7 +113,7 @@ LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
     }
     side.has_toe_joint =
         side.ankle + 2 == static_cast<int>(side.chain.size()) && leg.ball_offset_m == Vec3(0.0f);
-    // Between a vertical shank and the flat foot, the cosine of the angle is -sole_drop / length.
+    // The angle between a vertical shank and the flat foot has the cosine -sole_drop_m / sole_m.
     const double sole_drop_m = side.ankle_height_m - side.ball_height_m;
     const double sole_m = std::sqrt(sole_drop_m * sole_drop_m + side.foot_m * side.foot_m);
     if (side.foot_m >= kSmallestBoneM) {
