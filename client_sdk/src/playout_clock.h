@@ -32,7 +32,7 @@ class PlayoutClock {
   static constexpr double kMaxRate = 0.05;
   /// Close to the target, the difference decays with this time constant.
   static constexpr double kDecayS = 0.25;
-  /// Fraction of an interval that is added to the delay.
+  /// Margin that is added to the delay, as a fraction of the interval between messages.
   static constexpr double kMargin = 0.25;
   /// Delay after the first message, until the window is full.
   static constexpr double kFirstDelayS = 0.1;

@@ -43,7 +43,7 @@ const textBytes = 15;
 const decoder = new TextDecoder();
 const encoder = new TextEncoder();
 
-/** A module that uses one SIMD instruction. */
+/** A module with a SIMD instruction. It is invalid if the browser does not support SIMD. */
 const simdModule = Uint8Array.of(
     0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253,
     15, 253, 98, 11);

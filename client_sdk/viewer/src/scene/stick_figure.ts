@@ -27,7 +27,7 @@ export function buildStickFigure(skeleton: SkeletonLike, simplified = false): St
   const at = (j: number): Vec =>
     [parts.rest[j * 3]!, parts.rest[j * 3 + 1]!, parts.rest[j * 3 + 2]!];
 
-  // Joints become points in the order in which lines need them.
+  // The joint of each point. `point` adds a joint when a line first uses it.
   const joints: number[] = [];
   const place = new Map<number, number>();
   const regions: number[] = [];
