@@ -23,7 +23,7 @@ namespace stridewire::protocol {
 [[nodiscard]] Status CheckReducedJoints(std::span<const std::uint16_t> joints,
                                         std::span<const std::int16_t> parents);
 
-/// A RotationQuantization in the form that the encoder uses.
+/// A RotationQuantization of one joint in the form that CompactCodec uses.
 struct CompactJoint {
   float reference[4] = {};  ///< x, y, z, w
   float low[3] = {};
@@ -66,10 +66,11 @@ class CompactCodec {
   /// Block::StreamBytes can write up to this many pieces after the end of a pose.
   static constexpr std::size_t kMaxTrailingPieces = 3;
 
-  /// `parents` has one entry per joint: -1 for the root, else below the joint's own index. A pose
-  /// contains the joints in `included`, or all joints if it is empty. Fails with the errors of
-  /// CheckRotationQuantizations and CheckReducedJoints, with kShapeMismatch if the lists differ in
-  /// length, and with kOutOfRange for an invalid parent.
+  /// `codes` and `parents` have one entry per joint. The parent of the root is -1; all others are
+  /// less than the joint's own index. A pose contains the joints in `included`, or all joints if it
+  /// is empty. Fails with the errors of CheckRotationQuantizations and CheckReducedJoints, with
+  /// kShapeMismatch if `codes` and `parents` differ in length, and with kOutOfRange for an invalid
+  /// parent.
   [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationQuantization> codes,
                                                    std::span<const std::int16_t> parents,
                                                    std::span<const std::uint16_t> included = {});
