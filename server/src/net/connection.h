@@ -115,7 +115,7 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   std::span<const std::byte> unread_;
   bool is_text_ = false;          // True if the current WebSocket message is a text message.
   bool is_message_over_ = false;  // True if unread_ contains the end of the WebSocket message.
-  // A complete frame, until the end of its WebSocket message has arrived.
+  // A complete frame whose WebSocket message has not ended yet.
   std::optional<protocol::FrameView> whole_;
   std::vector<std::byte> handed_over_;  // The bytes that were passed to Start.
   bool is_reading_ = false;
