@@ -52,7 +52,7 @@ class TimeWarp {
   /// `keytimes_s` must increase; `cells` has one positive count per interval.
   TimeWarp(std::span<const double> keytimes_s, std::span<const int> cells);
 
-  /// Returns the grid position u in [0, cell_count] at `time_s`, which is clamped to the movement.
+  /// Returns the grid position in [0, number of cells] at `time_s`, clamped to the movement.
   [[nodiscard]] double GridPosition(double time_s) const;
   /// Inverts GridPosition, by bisection to 1e-12 s. Too slow for use in every tick.
   [[nodiscard]] double TimeAt(double grid_position) const;
