@@ -164,7 +164,7 @@ int Run(int argc, char** argv) {
       ->capture_default_str()
       ->check(Number(10.0, 1000.0, false));
   synthesize_app->add_flag("--no-correction", synthesize.no_correction,
-                           "Do not correct parameters when a movement starts");
+                           "Do not correct the weights when a movement starts");
   synthesize_app->add_flag("--no-planting", synthesize.no_planting,
                            "Do not plant feet; the blended feet may slide");
   synthesize_app->add_flag("--no-idle", synthesize.no_idle,
