@@ -65,9 +65,13 @@ double AngleBetween(const Quat& a, const Quat& b) {
   // Most angles are small: those between successive frames, for example. The angle is 2 atan(t).
   // Up to t = 0.1, the first term that is left out is less than 1e-14 rad.
   const double t2 = s2 / w2;
-  constexpr double k[] = {-1.0 / 3.0, 1.0 / 5.0, -1.0 / 7.0, 1.0 / 9.0, -1.0 / 11.0, 1.0 / 13.0};
+  constexpr double kSeries[] = {-1.0 / 3.0, 1.0 / 5.0,   -1.0 / 7.0,
+                                1.0 / 9.0,  -1.0 / 11.0, 1.0 / 13.0};
   return 2.0 * std::sqrt(t2) *
-         (1.0 + t2 * (k[0] + t2 * (k[1] + t2 * (k[2] + t2 * (k[3] + t2 * (k[4] + t2 * k[5]))))));
+         (1.0 + t2 * (kSeries[0] +
+                      t2 * (kSeries[1] +
+                            t2 * (kSeries[2] +
+                                  t2 * (kSeries[3] + t2 * (kSeries[4] + t2 * kSeries[5]))))));
 }
 
 }  // namespace stridewire
