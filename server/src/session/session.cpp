@@ -166,8 +166,8 @@ void Session::Housekeep(Clock::time_point now) {
     return;
   }
   for (auto& [id, membership] : context_.worlds) {
-    // Repeats one reply at a time, so that replies do not accumulate if the client does not read
-    // them.
+    // Waits until all control messages are sent, so that messages do not accumulate if the client
+    // does not read them.
     if (context_.connection->queue().control_empty()) stream_.SendLagging(membership);
   }
   UpdatePause();

@@ -12,7 +12,7 @@ using protocol::PoseMode;
 
 namespace {
 
-// Size of the states that one request to a shard requests.
+// Approximate size of the states that a shard sends per request.
 constexpr std::size_t kStatesBytes = 100'000;
 
 }  // namespace
