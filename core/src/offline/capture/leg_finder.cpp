@@ -22,11 +22,13 @@ constexpr double kFloorShare = 0.15;
 // Legs point down if the vectors from the hips to the ends of the legs have a mean downward
 // component of at least this fraction of the leg length.
 constexpr double kPointsDownShare = 0.3;
-// Another limb is a candidate for a further leg if it has at least this fraction of the leg length.
+// Minimum length of a limb that counts as a third leg, as a fraction of the leg length.
 constexpr double kOtherLegShare = 0.5;
+// A figure stands if its legs extend downward by at least this fraction of the leg length.
 constexpr double kStandsShare = 0.8;
 // A trunk is horizontal if its height difference is less than this fraction of its length.
 constexpr double kHorizontalShare = 0.5;
+// Fraction of the sampled poses that counts as most of them.
 constexpr double kMostPoses = 0.9;
 
 using Pose = std::vector<DVec3>;

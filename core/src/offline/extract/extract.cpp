@@ -100,12 +100,12 @@ class Extractor {
     first_frame_ = frames.begin;
     if (frames.begin > all.begin) {
       out_.notes.push_back(
-          Text("the first %d frames (%.2f s) hold a still pose that jumps to the motion: left out",
+          Text("left out the first %d frames (%.2f s), a still pose before a jump to the motion",
                frames.begin - all.begin, (frames.begin - all.begin) / clip_.fps));
     }
     if (frames.end < all.end) {
       out_.notes.push_back(
-          Text("the last %d frames (%.2f s) hold a still pose to which the motion jumps: left out",
+          Text("left out the last %d frames (%.2f s), a still pose after a jump of the motion",
                all.end - frames.end, (all.end - frames.end) / clip_.fps));
       clip_.Resize(frames.end, clip_.joint_count);
     }

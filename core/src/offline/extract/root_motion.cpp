@@ -90,7 +90,8 @@ bool WalksOnTheSpot(const BodyTracks& tracks, const GroundTravel& travel) {
       travel.left_share > 1.0 - kFootShareMin) {
     return false;
   }
-  // The legs of a figure that hangs or dances swing forward and backward by the same amount.
+  // If a figure hangs or dances, its legs swing forward and backward by the same amount, so that
+  // the displacements of its feet cancel out.
   DVec3 one_way(0.0);
   for (std::size_t i = 0; i + 1 < travel.position_m.size(); ++i) {
     one_way +=

@@ -61,8 +61,8 @@ struct AvatarBody {
   /// Makes the movement that was just started begin at `time_s` instead of 0.
   void SetStartOffset(double time_s);
 
-  /// Completes the movement that was just started: plans its feet if they are planted, and computes
-  /// the difference pose that fades out.
+  /// Must follow StartWeighted, and SetStartOffset if it is called. Plans the feet of the movement
+  /// if they are planted, and computes the difference pose that fades out.
   void BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch);
   void BlendIn(const LandingDecision& decision, bool keeps_speed, FootPlanScratch& scratch);
 

@@ -12,7 +12,8 @@ struct CellWeights {
   std::array<float, 4> weights{};
 };
 
-/// `grid_position` is clamped to [0, point_count - 1]. `point_count` is at least 2.
+/// Returns the weights at `grid_position`, which is clamped to [0, point_count - 1]. `point_count`
+/// is at least 2.
 [[nodiscard]] CellWeights CellWeightsAt(double grid_position, int point_count);
 
 }  // namespace stridewire

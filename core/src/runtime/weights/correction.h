@@ -80,7 +80,7 @@ class CorrectionScratch {
 /// `wanted` (paper, Section 4; the paper searches for p* with a(p*) = p^ instead). Performs
 /// Gauss-Newton iterations on the weights:
 ///
-///   w <- w + D J^T y,   [J; 1] D [J; 1]^T y = [p^ - a(w); 0],   J = a'(w) [d][n],
+///   w <- w + D [J; 1]^T y,   [J; 1] D [J; 1]^T y = [p^ - a(w); 0],   J = a'(w) [d][n],
 ///   D = diag(|w| + half of its mean)
 ///
 /// Of all changes that correct the parameters to first order, this is the smallest one relative to
