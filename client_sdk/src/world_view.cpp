@@ -217,7 +217,7 @@ void WorldView::RecordEvaluated(const protocol::Movements& movements) {
   protocol::PoseMode mode = protocol::PoseMode::kCompact;
   if (fits_ && block_.size() > 0) EncodeBlock(*codecs_->Find(mode));
   if (!fits_) {
-    // A pose is outside the range of the compact codes, or there are no codes.
+    // A pose is outside the range of the compact mode, or the world has no such mode.
     mode = protocol::PoseMode::kQuantised;
     const std::size_t bytes = protocol::PoseBytes(mode, joints);
     encoded_.resize(evaluated_.size() * bytes);

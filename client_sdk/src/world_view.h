@@ -219,7 +219,7 @@ class WorldView : public PoseSink {
   std::vector<std::uint8_t> evaluated_flags_;
   std::vector<std::byte> encoded_;
   protocol::CompactCodec::Block block_;
-  bool fits_ = true;                 // False if a pose is outside the range of the compact codes.
+  bool fits_ = true;                 // False if a pose is outside the range of the compact mode.
   std::uint16_t recorded_part_ = 0;  // Distinguishes messages of the same tick in the recording.
 };
 

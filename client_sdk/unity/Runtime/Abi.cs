@@ -156,10 +156,11 @@ namespace Stridewire
         /// that the server refused, or the id that it chose for a spawned avatar. Precedes the
         /// REPLY.</summary>
         Item = 7,
-        /// <summary>Uses dropped_batches, dropped_events. This client reads too slowly.</summary>
+        /// <summary>Uses world, dropped_batches, dropped_events. This client reads too
+        /// slowly.</summary>
         Lagging = 8,
-        /// <summary>Uses status, text. A message of the server that does not end the
-        /// connection.</summary>
+        /// <summary>Uses status, text, and command and world if they are known. A message of the
+        /// server that does not end the connection.</summary>
         Notice = 9,
         /// <summary>Uses rtt_s, tick, time_s.</summary>
         Pong = 10,

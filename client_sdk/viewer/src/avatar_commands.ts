@@ -38,9 +38,12 @@ export class AvatarCommands {
   /** The world whose terrain this page is changing. */
   private terrainRequestedFor: World | null = null;
   private terrainChoiceWorld: World | null = null;
-  /** Layers that play, as far as the page knows. Each entry is "avatar layer". */
+  /**
+   * Layers that are playing, according to the commands of this page and the states that the server
+   * reports. Each entry is "avatar layer".
+   */
   private readonly playingLayers = new WeakMap<World, Set<string>>();
-  /** Avatars whose foot planting is disabled, as far as the page knows. */
+  /** Avatars whose foot planting is disabled, from the same sources. */
   private readonly unplantedAvatars = new WeakMap<World, Set<number>>();
   /**
    * Number of toggles whose effect reported states may not contain yet. While it is above 0, the

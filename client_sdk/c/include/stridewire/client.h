@@ -470,9 +470,10 @@ typedef enum stridewire_event_type {
   /// Uses command, item_index, avatar, request_id, status, text. Reports an item that the server
   /// refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
   STRIDEWIRE_EVENT_ITEM = 7,
-  /// Uses dropped_batches, dropped_events. This client reads too slowly.
+  /// Uses world, dropped_batches, dropped_events. This client reads too slowly.
   STRIDEWIRE_EVENT_LAGGING = 8,
-  /// Uses status, text. A message of the server that does not end the connection.
+  /// Uses status, text, and command and world if they are known. A message of the server that does
+  /// not end the connection.
   STRIDEWIRE_EVENT_NOTICE = 9,
   STRIDEWIRE_EVENT_PONG = 10,  ///< Uses rtt_s, tick, time_s.
   /// Uses world. Its terrain has changed; see stridewire_client_get_terrain.

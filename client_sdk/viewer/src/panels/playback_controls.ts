@@ -12,7 +12,7 @@ export class PlaybackControls {
   private readonly scrub: HTMLInputElement;
   private readonly liveButton: HTMLButtonElement;
   private readonly delayText = h('span', {class: 'delay'});
-  /** Summary of the state that the controls show, to skip updates without a change. */
+  /** Summary of the state that the controls show. They are updated only if it changes. */
   private shownState = '';
   private range: TimeRange | null = null;
 

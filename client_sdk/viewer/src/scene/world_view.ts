@@ -100,7 +100,7 @@ export class WorldView {
   private readonly lastFootHeadings = new Map<number, number>();
   private readonly unsubscribe: (() => void)[];
   private readonly planned = makePlannedFootprints(maxPlannedFootprints);
-  /** Describes what the decals show, to skip uploads without a change. */
+  /** Describes what the decals show. They are uploaded only if it changes. */
   private plannedVersion = '';
   private readonly goals = makeGoals(maxGoalDecals);
   private goalsVersion = '';
