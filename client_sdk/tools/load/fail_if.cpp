@@ -78,10 +78,10 @@ bool FailIf::Fails(const LoadReport& report) const {
 
 std::string FailIf::Explain(const LoadReport& report) const {
   const std::optional<double> value = ReportNumber(report, name_);
-  if (!value) return text_ + ": it was not measured";
+  if (!value) return text_ + ": the value was not measured";
   char number[32];
   std::snprintf(number, sizeof number, "%.6g", *value);
-  return text_ + ": it is " + number;
+  return text_ + ": the value is " + number;
 }
 
 }  // namespace stridewire::load

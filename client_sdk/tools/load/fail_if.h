@@ -20,7 +20,7 @@ class FailIf {
   /// missing measurement does not count as a success.
   [[nodiscard]] bool Fails(const LoadReport& report) const;
 
-  /// Describes the failure, for example "ticks_missed>0: it is 3".
+  /// Describes the failure, for example "ticks_missed>0: the value is 3".
   [[nodiscard]] std::string Explain(const LoadReport& report) const;
 
   [[nodiscard]] const std::string& name() const { return name_; }

@@ -189,11 +189,13 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
   } catch (const CLI::CallForVersion&) {
     line.text = app.version() + "\n";
     return line;
-  } catch (const CLI::ExtrasError&) {
-    // The text of the exception lists the arguments in reverse order.
-    return Fail(ErrorCode::kInvalidArgument, "unknown option or surplus argument; see --help",
-                app.remaining().front());
   } catch (const CLI::ParseError& error) {
+    // An unknown option is reported before a missing one. The text of an ExtrasError lists the
+    // arguments in reverse order.
+    if (const auto surplus = app.remaining(); !surplus.empty()) {
+      return Fail(ErrorCode::kInvalidArgument, "unknown option or surplus argument; see --help",
+                  surplus.front());
+    }
     std::string what = error.what();
     std::replace(what.begin(), what.end(), '\n', ' ');
     return Fail(ErrorCode::kInvalidArgument, "see --help", what);

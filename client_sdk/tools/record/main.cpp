@@ -103,11 +103,13 @@ int Run(int argc, char** argv) {
     return app.exit(help);
   } catch (const CLI::CallForVersion& version) {
     return app.exit(version);
-  } catch (const CLI::ExtrasError&) {
-    // The text of the exception lists the arguments in reverse order.
-    return PrintError(app.remaining().front() + ": unknown option or surplus argument (see --help)",
-                      kExitBadUsage);
   } catch (const CLI::ParseError& error) {
+    // An unknown option is reported before a missing one. The text of an ExtrasError lists the
+    // arguments in reverse order.
+    if (const auto surplus = app.remaining(); !surplus.empty()) {
+      return PrintError(surplus.front() + ": unknown option or surplus argument (see --help)",
+                        kExitBadUsage);
+    }
     return PrintError(std::string(error.what()) + " (see --help)", kExitBadUsage);
   }
 

@@ -936,7 +936,9 @@ TEST(Record, ExitsWithTwoOnInvalidOptions) {
     EXPECT_THAT(result.err, HasSubstr("wrong"));
   }
   EXPECT_EQ(RecordTool({}).exit_code, 2);
-  EXPECT_EQ(RecordTool({"--nonsense"}).exit_code, 2);
+  const auto unknown = RecordTool({"--nonsense"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("--nonsense: unknown option"));
   EXPECT_EQ(folder.Count(), 0);
   const auto help = RecordTool({"--help"});
   EXPECT_EQ(help.exit_code, 0);

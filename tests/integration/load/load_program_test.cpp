@@ -233,7 +233,7 @@ TEST(LoadProgram, ExitsWithOneIfAConditionIsTrue) {
       server.Load({"--avatars", "5", "--observers", "1", "--seconds", "0.5", "--fail-if",
                    "poses_received>0", "--fail-if", "poses_invalid>0"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("--fail-if poses_received>0: it is "));
+  EXPECT_THAT(result.err, HasSubstr("--fail-if poses_received>0: the value is "));
   EXPECT_THAT(result.err, testing::Not(HasSubstr("poses_invalid")));
   EXPECT_GT(ReportOf(result)["poses_received"], 0);
 }

@@ -50,13 +50,14 @@ TEST(FailIf, CountsErrors) {
 TEST(FailIf, FailsIfTheNumberWasNotMeasured) {
   EXPECT_TRUE(Fails("step_latency_ms.p99>1000000"));
   const Expected<FailIf> fail_if = FailIf::Parse("step_latency_ms.p99>1000000");
-  EXPECT_EQ(fail_if->Explain(SomeReport()), "step_latency_ms.p99>1000000: it was not measured");
+  EXPECT_EQ(fail_if->Explain(SomeReport()),
+            "step_latency_ms.p99>1000000: the value was not measured");
 }
 
 TEST(FailIf, ExplainsTheFailure) {
   const Expected<FailIf> fail_if = FailIf::Parse(" tick_ms.p99 > 1 ");
   ASSERT_TRUE(fail_if.has_value());
-  EXPECT_EQ(fail_if->Explain(SomeReport()), "tick_ms.p99 > 1: it is 2");
+  EXPECT_EQ(fail_if->Explain(SomeReport()), "tick_ms.p99 > 1: the value is 2");
 }
 
 TEST(FailIf, AcceptsEveryNumberOfTheReport) {
