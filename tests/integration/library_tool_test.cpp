@@ -78,7 +78,7 @@ json ParseOutput(const std::string& out) {
   return parsed;
 }
 
-// Returns the output of `inspect --json` without what it says about movements in plain words.
+// Returns the output of `inspect --json` without the summary and the self-check.
 json Groups(const std::string& out) {
   json library = ParseOutput(out);
   library.erase("summary");

@@ -184,7 +184,8 @@ Capture ThroughFile(const Capture& capture) {
   return ParseBvh(text.str(), "walk.bvh").value();
 }
 
-// In a file, the rest pose of such a figure is a tangle, so the reader must not rely on it.
+// In a file, the joints of the rest pose of such a figure point in arbitrary directions, so the
+// reader must not rely on it.
 TEST(ReframedFiles, PlayTheSame) {
   const std::vector<std::string> subjects = {kDebianTakes};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);

@@ -298,7 +298,7 @@ TEST(AvatarReplica, AllocatesOnlyInItsConstructor) {
   }
 }
 
-// Damaged and foreign bytes must be rejected or displayed as something, without a crash.
+// Damaged and foreign bytes are either rejected or evaluated to some pose, without a crash.
 TEST(AvatarReplica, SurvivesDamagedRecords) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);

@@ -122,7 +122,8 @@ class CapturedWalk : public testing::TestWithParam<bool> {
 TEST_P(CapturedWalk, IsSmooth) { ExpectASmoothWalk(library_, 0.45, 0.77, 216); }
 
 TEST_P(CapturedWalk, IsStraightWithEqualSteps) {
-  // Without mirror images, steps of one foot lead a little further aside than those of the other.
+  // Without mirror images, steps of one foot lead a little further to the side than those of the
+  // other.
   for (const double length_m : {0.55, 0.65, 0.75}) ExpectAStraightWalk(library_, length_m, 0.7);
 }
 

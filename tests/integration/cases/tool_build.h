@@ -8,7 +8,7 @@
 
 namespace stridewire::test {
 
-/// What `stridewire-library build --json` made of one BVH file.
+/// Result of `stridewire-library build --json` for one BVH file.
 struct ToolBuild {
   int exit_code = -1;
   std::string err;        ///< Output on stderr.

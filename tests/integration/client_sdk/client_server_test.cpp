@@ -298,7 +298,7 @@ TEST(ClientAndServer, ObserversReceiveEqualPosesWithinTheQuantisationError) {
   }
   EXPECT_GT(compared, 60);
   EXPECT_GT(worst_rad, 0.0);
-  // A joint's own error in the world, and its parent's, which it makes up for.
+  // A joint's own error in the world, and that of its parent, which it compensates.
   EXPECT_LT(worst_rad, 0.004 + 0.002);
   EXPECT_LE(worst_m, 0.5 / protocol::kRootStepsPerM + 1e-6);
 }
@@ -479,8 +479,9 @@ TEST(ClientAndServer, MovesToAnotherServer) {
   EXPECT_TRUE(is_there(*first, "127.0.0.1"));
 }
 
-/// Lets an avatar walk and checks what a client of a server that is killed again and again must not
-/// do: lose or repeat a reply, end a request twice, or display a jump without a new segment.
+/// Lets an avatar walk on a server that is killed again and again. Checks that the client receives
+/// exactly one reply per command and at most one end per request, and that every displayed jump
+/// starts a new segment.
 class RestartObserver {
  public:
   explicit RestartObserver(User& user) : user_(user) {}
@@ -659,7 +660,7 @@ class DisplayedSteps {
     return ratio;
   }
   [[nodiscard]] int segments() const { return segments_; }
-  /// Returns the delay of which a part of the frames is not longer.
+  /// Returns the quantile `part` of the delays, for example their median for 0.5.
   [[nodiscard]] double DelayS(double part) {
     std::ranges::sort(delays_s_);
     return delays_s_.at(static_cast<std::size_t>(part * static_cast<double>(delays_s_.size() - 1)));

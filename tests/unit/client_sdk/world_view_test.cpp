@@ -236,7 +236,7 @@ TEST_F(WorldViewTest, CompactPosesEqualFullPoses) {
                          codecs.Find(info.mode)));
   std::vector<Quat> pose = test_world::RotationsAt(0.75);
   ASSERT_TRUE(rows.Add(0, Vec3(1.0f), pose));
-  pose[1] = YawRotation(1.0);  // outside the range of the codes: sent uncompressed
+  pose[1] = YawRotation(1.0);  // outside the range of the compact mode: sent uncompressed
   ASSERT_TRUE(rows.Add(0, Vec3(2.0f), pose));
   pose[1] = kIdentityQuat;
   ASSERT_TRUE(rows.Add(0, Vec3(3.0f), pose));
@@ -255,7 +255,7 @@ TEST_F(WorldViewTest, CompactPosesEqualFullPoses) {
               1e-3);
     EXPECT_LT(AngleBetween(history.rotations(0)[2], YawRotation(0.75)), 2e-3);
   }
-  // Compact poses of a world without codes are an error.
+  // Compact poses of a world without quantizations of rotations are an error.
   protocol::WorldInfo uncoded = test_world::WorldInfo(1, 1, "plaza");
   uncoded.rotation_quantizations.clear();
   uncoded.reduced_joints.clear();

@@ -56,7 +56,7 @@ TEST(CompactCodec, MatchesTheStandard) {
   const CompactCodec codec = Codec();
   EXPECT_EQ(codec.joint_count(), 3u);
   ASSERT_EQ(codec.pose_bytes(), 12u + 12u);
-  // The rotations are exact in their codes, so that no joint has to correct an error.
+  // The rotations are represented exactly, so that no joint has to correct an error.
   const Quat bent = Quat(std::sqrt(0.984375f), 0.125f, 0.0f, 0.0f);
   const Quat turned = Codes()[1].reference * Quat(std::sqrt(0.6875f), 0.25f, -0.5f, 0.0f);
   const auto bytes = BytesOf(codec, Vec3(1.0f, -0.5f, 0.00002f), {Quat(0, 0, -1, 0), turned, bent});

@@ -4,7 +4,7 @@
 #include "every_header.h"
 
 int main() {
-  // Calls into the compiled libraries, so that linking is really tried.
+  // Calls into the compiled libraries, so that the program must be linked with them.
   double heading_rad = 0.0;
   if (!stridewire::HeadingOf(stridewire::YawRotation(0.5), heading_rad)) return 1;
   if (std::strcmp(stridewire_version(), stridewire::kVersion) != 0) return 1;

@@ -43,7 +43,7 @@ TEST(ExtractGround, FindsAllStepsOverKerbsOfAnyHeight) {
     }
     EXPECT_TRUE(found.general_steps[0].level);
     EXPECT_TRUE(found.general_steps[5].level);
-    // Levels that differ by less than 3 cm are not told apart.
+    // Levels that differ by less than 3 cm are not distinguished.
     EXPECT_NEAR(found.ball_height_m[0], kWalkerBallHeightM, std::fabs(rise) < 0.03 ? 0.011 : 0.003);
   }
 }

@@ -1,4 +1,4 @@
-// The public class Avatar shows what the simulation behind it computes, alone and in a crowd.
+// The public class Avatar returns what its simulation computes, alone and in a crowd.
 
 #include <gtest/gtest.h>
 

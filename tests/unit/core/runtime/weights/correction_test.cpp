@@ -106,8 +106,8 @@ TEST_P(InDimensions, ReachesRequestsInsideTheHull) {
       EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
     }
   }
-  // If all errors were smaller, nothing would have been corrected. One in 600 random libraries has
-  // errors below 0.09 mm, but not four in a row.
+  // Otherwise there was nothing to correct. One in 600 random libraries has no error above 0.09 mm,
+  // but not all four.
   EXPECT_GT(largest_m, 1e-4);
 }
 
