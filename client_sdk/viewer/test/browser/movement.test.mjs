@@ -5,19 +5,15 @@
 import assert from 'node:assert/strict';
 import {execFileSync} from 'node:child_process';
 import {mkdtempSync, readFileSync, rmSync} from 'node:fs';
-import http from 'node:http';
-import {once} from 'node:events';
 import {tmpdir} from 'node:os';
 import {dirname, join} from 'node:path';
 import {after, before, test} from 'node:test';
 import {fileURLToPath} from 'node:url';
 
-import * as esbuild from 'esbuild';
-
 import {launch} from '../browser.mjs';
 import {
-  Server, Walkers, numberFrom, openInContext, openPage, programs, saveScreenshot, waitFor,
-  waitForAvatars, waitForFrames,
+  Server, Walkers, numberFrom, openInContext, openPage, programs, saveScreenshot, serveModule,
+  waitFor, waitForAvatars, waitForFrames,
 } from './support.mjs';
 
 const ticks = numberFrom('STRIDEWIRE_TICKS', 500);
@@ -42,54 +38,31 @@ after(async () => {
   await server?.kill();
 });
 
-/** Serves files by their path: a map from path to type and content. */
-async function serve(files) {
-  const listener = http.createServer(({url}, response) => {
-    const [type, content] = files[url] ?? ['text/plain', null];
-    response.writeHead(content === null ? 404 : 200, {'Content-Type': type});
-    response.end(content ?? 'not found');
-  });
-  listener.listen(0, '127.0.0.1');
-  await once(listener, 'listening');
-  return listener;
-}
-
 test('a page and a worker evaluate the same poses as the C++ client, to the bit', async () => {
   const folder = mkdtempSync(join(tmpdir(), 'stridewire-movement-'));
-  let listener;
+  let served;
   try {
     const stream = join(folder, 'stream');
     execFileSync(`${programs}/web_movement_stream`,
       ['builtin', `${avatars}`, `${ticks}`, `${seed}`, stream]);
     const here = dirname(fileURLToPath(import.meta.url));
-    const script = await esbuild.build({
-      stdin: {
-        contents: `import {replayMovements} from './movement_replay';
-          globalThis.replay = async () => {
-            const began = performance.now();
-            const file = await (await fetch('/stream')).arrayBuffer();
-            const result = await replayMovements(file);
-            return {...result, ms: performance.now() - began};
-          };
-          if (typeof document === 'undefined') postMessage(await replay());`,
-        resolveDir: join(here, '../../../web/test/support'), loader: 'ts',
-      },
-      bundle: true, format: 'esm', target: 'es2022', loader: {'.wasm': 'binary'}, write: false,
-    });
-    listener = await serve({
-      '/': ['text/html', '<script type="module" src="/replay.js"></script>'],
-      '/favicon.ico': ['image/x-icon', ''],
-      '/replay.js': ['text/javascript', script.outputFiles[0].contents],
-      '/stream': ['application/octet-stream', readFileSync(stream)],
-    });
+    served = await serveModule(`import {replayMovements} from './movement_replay';
+      globalThis.replay = async () => {
+        const began = performance.now();
+        const file = await (await fetch('/stream')).arrayBuffer();
+        const result = await replayMovements(file);
+        return {...result, ms: performance.now() - began};
+      };
+      if (typeof document === 'undefined') postMessage(await replay());`,
+    join(here, '../../../web/test/support'),
+    {'/stream': ['application/octet-stream', readFileSync(stream)]});
     const context = await browser.newContext();
-    const {page, errors} =
-      await openInContext(context, `http://127.0.0.1:${listener.address().port}/`);
+    const {page, errors} = await openInContext(context, `${served.origin}/`);
     await waitFor('the script is loaded', () => page.evaluate(() => 'replay' in window));
     for (const where of ['page', 'worker']) {
       const {ms, ...result} = await page.evaluate((place) => place === 'page' ? window.replay() :
         new Promise((resolve, reject) => {
-          const worker = new Worker('/replay.js', {type: 'module'});
+          const worker = new Worker('/script.js', {type: 'module'});
           worker.onmessage = ({data}) => resolve(data);
           worker.onerror = ({message}) => reject(new Error(message));
         }), where);
@@ -100,7 +73,7 @@ test('a page and a worker evaluate the same poses as the C++ client, to the bit'
     assert.deepEqual(errors, []);
     await context.close();
   } finally {
-    listener?.close();
+    served?.stop();
     rmSync(folder, {recursive: true, force: true});
   }
 });

@@ -8,6 +8,7 @@ import http from 'node:http';
 import net from 'node:net';
 
 import {Client} from '@stridewire/client';
+import * as esbuild from 'esbuild';
 import WebSocket from 'ws';
 
 import {decodePng} from './png.mjs';
@@ -51,12 +52,12 @@ export async function waitFor(what, condition, seconds = 120) {
 export class Server {
   /**
    * Starts on the given ports, or on free ones. If another process has taken a given port, tries
-   * again for a while.
+   * again for a while. `more` are further arguments of stridewired.
    */
-  static async start(port = 0, httpPort = 0) {
+  static async start(port = 0, httpPort = 0, more = []) {
     for (let attempt = 1; ; ++attempt) {
       try {
-        return await this.launch(port, httpPort);
+        return await this.launch(port, httpPort, more);
       } catch (error) {
         if (port === 0 || attempt === 20) throw error;
         await sleep(500);
@@ -64,9 +65,10 @@ export class Server {
     }
   }
 
-  static async launch(port, httpPort) {
+  static async launch(port, httpPort, more) {
     const child = spawn(`${programs}/stridewired`, [
       '--listen', `127.0.0.1:${port}`, '--http', `127.0.0.1:${httpPort}`, '--log-level', 'warning',
+      ...more,
     ], {stdio: ['ignore', 'pipe', 'inherit']});
     let out = '';
     child.stdout.setEncoding('utf8');
@@ -104,6 +106,37 @@ export class Server {
     if (lines.length === 0) throw new Error(`/metrics has no ${name}`);
     return lines.reduce((sum, line) => sum + Number(line.split(' ').at(-1)), 0);
   }
+}
+
+/**
+ * Bundles a TypeScript module and serves a page that runs it. Imports in `contents` are relative to
+ * `resolveDir`. `files` is a map from further paths to their type and content.
+ */
+export async function serveModule(contents, resolveDir, files = {}) {
+  const script = await esbuild.build({
+    stdin: {contents, resolveDir, loader: 'ts'},
+    bundle: true, format: 'esm', target: 'es2022', loader: {'.wasm': 'binary'}, write: false,
+  });
+  const all = {
+    '/': ['text/html', '<!doctype html><script type="module" src="/script.js"></script>'],
+    '/favicon.ico': ['image/x-icon', ''],
+    '/script.js': ['text/javascript', script.outputFiles[0].contents],
+    ...files,
+  };
+  const listener = http.createServer(({url}, response) => {
+    const [type, content] = all[url] ?? ['text/plain', null];
+    response.writeHead(content === null ? 404 : 200, {'Content-Type': type});
+    response.end(content ?? 'not found');
+  });
+  listener.listen(0, '127.0.0.1');
+  await once(listener, 'listening');
+  return {
+    origin: `http://127.0.0.1:${listener.address().port}`,
+    stop: () => {
+      listener.close();
+      listener.closeAllConnections();
+    },
+  };
 }
 
 /** A TCP proxy between page and server, whose connections a test can cut. */
