@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "interpolate_kernel.h"
 
 namespace stridewire::client {
@@ -89,6 +90,20 @@ std::size_t PoseHistory::FirstAfterTime(double time_s) const {
     }
   }
   return low;
+}
+
+void PoseHistory::Prefetch(double time_s, bool is_near) const {
+  if (size_ == 0) return;
+  if (!is_near) {
+    PrefetchBytes(&stamps_[Slot(size_ - 1)], sizeof(PoseStamp));
+    return;
+  }
+  const std::size_t after = FirstAfterTime(time_s);
+  const std::size_t begin = after >= 2 ? after - 2 : 0;
+  const std::size_t end = std::min(after + 2, size_);
+  for (std::size_t i = begin; i < end; ++i) {
+    PrefetchBytes(rotations(i).data(), rotations(i).size_bytes());
+  }
 }
 
 std::optional<std::size_t> PoseHistory::FirstAfterTick(std::uint64_t tick) const {

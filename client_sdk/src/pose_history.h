@@ -68,6 +68,10 @@ class PoseHistory {
     return std::span(rotations_).subspan(Slot(i) * joint_count_, joint_count_);
   }
 
+  /// Prefetches the poses that Display will probably read. First call it with `is_near` false, and
+  /// later with true.
+  void Prefetch(double time_s, bool is_near) const;
+
   /// Returns the index of the oldest pose with a tick above `tick`, if any.
   [[nodiscard]] std::optional<std::size_t> FirstAfterTick(std::uint64_t tick) const;
 

@@ -310,7 +310,10 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
   const std::size_t joints = skeleton_.joints.size();
   out.Resize(tracks_.size(), joints);
   std::size_t count = 0;
-  for (Track& track : tracks_) {
+  for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (i + 2 < tracks_.size()) tracks_[i + 2].history.Prefetch(time_s, false);
+    if (i + 1 < tracks_.size()) tracks_[i + 1].history.Prefetch(time_s, true);
+    Track& track = tracks_[i];
     PoseHistory& history = track.history;
     if (history.size() == 0) continue;
     const bool is_after_newest = time_s > history.stamp(history.size() - 1).time_s;
