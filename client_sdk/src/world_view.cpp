@@ -180,7 +180,7 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseS
 
 void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                        ConstPoseSpan pose) {
-  if (stamp.tick % replica_every_n_ticks_ != 0 || !Wants(avatar)) return;
+  if (!Wants(avatar)) return;
   Track* track = FindOrAddTrack(avatar);
   if (track == nullptr) {
     ++replica_counts_->refused;

@@ -95,8 +95,8 @@ class WorldView : public PoseSink {
   /// with kLimitExceeded for too many shards, and with kMalformed if the ticks of a shard decrease.
   Status Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
 
-  /// Evaluates movement records with `replicas`. Stores and records the poses of ticks that are
-  /// multiples of `every_n_ticks`. Fails with the errors of ReplicaSet::Apply, and with
+  /// Applies movement records to `replicas`. Evaluates, stores and records the poses of ticks that
+  /// are multiples of `every_n_ticks`. Fails with the errors of ReplicaSet::Apply, and with
   /// kShapeMismatch.
   Status Apply(const protocol::Movements& movements, ReplicaSet& replicas,
                std::uint64_t every_n_ticks, Counts& counts);
@@ -167,6 +167,7 @@ class WorldView : public PoseSink {
               ConstPoseSpan pose) override;
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
+  [[nodiscard]] std::uint64_t EveryNTicks() const override { return replica_every_n_ticks_; }
   /// Returns the first track whose avatar is not below `avatar`.
   [[nodiscard]] std::vector<Track>::iterator LowerBound(protocol::AvatarId avatar);
   [[nodiscard]] const Track* FindTrack(protocol::AvatarId avatar) const;

@@ -99,7 +99,7 @@ struct Figures {
 
 void Advance(AvatarReplica& replica, ReplicaEvaluator& evaluator, double dt_s) {
   AvatarReplica* one = &replica;
-  AvatarReplica::AdvanceAll(std::span(&one, 1), dt_s, evaluator);
+  AvatarReplica::AdvanceAll(std::span(&one, 1), {.length_s = dt_s}, evaluator);
 }
 
 int Begun(const AvatarSimulation& avatar) {
@@ -256,7 +256,7 @@ TEST_P(ReplicaLibraries, HasTheSameBytesOnEveryInstructionSet) {
           if (record.empty()) continue;
           ASSERT_EQ(Refusal(replicas[i], record), "");
         }
-        AvatarReplica::AdvanceAll(all, manner.tick_s, evaluator);
+        AvatarReplica::AdvanceAll(all, {.length_s = manner.tick_s, .number = t}, evaluator);
         for (std::size_t i = 0; i < kAvatars; ++i) {
           ASSERT_TRUE(BytesOf(replicas[i].pose()) == ticks[t].poses[i])
               << hwy::TargetName(told_on) << " shown on " << hwy::TargetName(shown_on) << ", tick "

@@ -62,6 +62,23 @@ void ReplicaSet::EmitPose(const protocol::Movements& message, Avatar& avatar, Po
   sink.OnPose(avatar.id, message.shard, stamp, avatar.replica->pose());
 }
 
+// Advances the avatars in `due_` by one tick. Passes their poses to the sink if `emits` is true and
+// the sink needs the tick.
+void ReplicaSet::AdvanceDue(const protocol::Movements& message, bool emits, PoseSink& sink) {
+  const std::uint64_t every_n_ticks = sink.EveryNTicks();
+  const bool has_poses = emits && message.tick % every_n_ticks == 0;
+  replicas_.clear();
+  for (const Avatar* avatar : due_) replicas_.push_back(avatar->replica.get());
+  AvatarReplica::AdvanceAll(replicas_,
+                            {.length_s = tick_s_,
+                             .number = message.step,
+                             .has_poses = has_poses,
+                             .ticks_apart = static_cast<int>(every_n_ticks)},
+                            evaluator_);
+  if (!has_poses) return;
+  for (Avatar* avatar : due_) EmitPose(message, *avatar, sink);
+}
+
 void ReplicaSet::CheckAvatarCount() const {
   std::size_t count = 0;
   for (const auto& [id, shard] : shards_) count += shard.avatars.size();
@@ -81,13 +98,6 @@ Status ReplicaSet::Apply(const protocol::Movements& message, PoseSink& sink) {
   std::erase_if(shard.avatars, [](const Avatar& avatar) { return avatar.replica == nullptr; });
   CheckAvatarCount();
   if (!status) return status;
-  const auto advance = [&](std::span<Avatar* const> avatars, bool emits) {
-    replicas_.clear();
-    for (const Avatar* avatar : avatars) replicas_.push_back(avatar->replica.get());
-    AvatarReplica::AdvanceAll(replicas_, tick_s_, evaluator_);
-    if (!emits) return;
-    for (Avatar* avatar : avatars) EmitPose(message, *avatar, sink);
-  };
   due_.clear();
   if (message.states) {
     for (const protocol::AvatarId id : message.avatars) {
@@ -96,14 +106,14 @@ Status ReplicaSet::Apply(const protocol::Movements& message, PoseSink& sink) {
     }
     std::ranges::sort(due_);
     due_.erase(std::ranges::unique(due_).begin(), due_.end());
-    advance(due_, true);
+    AdvanceDue(message, true, sink);
     return {};
   }
   if (++shard.parts_applied < message.parts) return {};
   shard.parts_applied = 0;
   shard.step = message.step;
   for (Avatar& avatar : shard.avatars) due_.push_back(&avatar);
-  advance(due_, message.more_steps == 0);
+  AdvanceDue(message, message.more_steps == 0, sink);
   return {};
 }
 

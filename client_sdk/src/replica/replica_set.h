@@ -28,6 +28,9 @@ class PoseSink {
   /// The set evaluates only avatars for which this function returns true. If the result changes to
   /// true, the avatar appears when the server sends its next state.
   [[nodiscard]] virtual bool Wants(protocol::AvatarId) const { return true; }
+
+  /// The set evaluates only poses of ticks that are multiples of this number, at least 1.
+  [[nodiscard]] virtual std::uint64_t EveryNTicks() const { return 1; }
 };
 
 /// Evaluates the avatars of one world from movement records (protocol/STANDARD.md, "Movement
@@ -73,6 +76,7 @@ class ReplicaSet {
   void Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink);
   [[nodiscard]] Status ApplyRecord(const protocol::Movements& message, std::size_t i, Shard& shard,
                                    PoseSink& sink);
+  void AdvanceDue(const protocol::Movements& message, bool emits, PoseSink& sink);
   static void EmitPose(const protocol::Movements& message, Avatar& avatar, PoseSink& sink);
   void CheckAvatarCount() const;
 

@@ -69,7 +69,8 @@ class MovementReader {
     }
     std::vector<AvatarReplica*> replicas;
     for (const AvatarId avatar : due) replicas.push_back(shard.avatars.at(avatar).get());
-    AvatarReplica::AdvanceAll(replicas, 1.0 / 60.0, evaluator_);
+    AvatarReplica::AdvanceAll(replicas, {.length_s = 1.0 / 60.0, .number = message.step},
+                              evaluator_);
     if (message.states || message.more_steps == 0) {
       for (const AvatarId avatar : due) StorePose(message.tick, avatar, *shard.avatars.at(avatar));
     }

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <map>
 #include <set>
+#include <utility>
 
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
@@ -31,11 +32,13 @@ struct CollectingSink : PoseSink {
   }
   void OnGone(AvatarId avatar) override { gone.insert(avatar); }
   [[nodiscard]] bool Wants(AvatarId avatar) const override { return avatar != unwanted; }
+  [[nodiscard]] std::uint64_t EveryNTicks() const override { return every_n_ticks; }
 
   std::map<AvatarId, Pose> poses;
   std::map<AvatarId, PoseStamp> stamps;
   std::set<AvatarId> gone;
   AvatarId unwanted = 0;
+  std::uint64_t every_n_ticks = 1;
 };
 
 // Simulates a shard of walking avatars and produces its messages.
@@ -122,6 +125,27 @@ TEST(ReplicaSet, EvaluatesAvatarsAfterTheirStates) {
     ASSERT_EQ(server.CountEqualPoses(sink), 5);
   }
   EXPECT_FALSE(sink.stamps[1].discontinuity);
+}
+
+TEST(ReplicaSet, EvaluatesOnlyTicksThatTheSinkNeeds) {
+  Server server(5);
+  CollectingSink sink;
+  ReplicaSet replicas(server.library(), kTickS, 100);
+  sink.every_n_ticks = 5;
+  const Movements first = server.Step();
+  ASSERT_NE(first.tick % 5, 0u);
+  ASSERT_TRUE(replicas.Apply(first, sink));
+  EXPECT_TRUE(sink.poses.empty());
+  bool is_first = true;
+  for (int i = 0; i < 600; ++i) {
+    if (i % 60 == 59) sink.every_n_ticks = i % 180 == 179 ? 1 : 2 + i % 4;
+    const Movements message = server.Step();
+    ASSERT_TRUE(replicas.Apply(message, sink));
+    const bool has_poses = message.tick % sink.every_n_ticks == 0;
+    ASSERT_EQ(server.CountEqualPoses(sink), has_poses ? 5 : 0) << "step " << i;
+    if (!has_poses) continue;
+    EXPECT_EQ(sink.stamps[1].discontinuity, std::exchange(is_first, false)) << "step " << i;
+  }
 }
 
 TEST(ReplicaSet, EmitsPosesAfterTheLastStepAndPart) {

@@ -161,12 +161,12 @@ void SetTimes(MovementKind kind, Movement& movement) {
 }  // namespace
 
 ReplicaEvaluator::ReplicaEvaluator(const MotionLibrary& library)
-    : evaluator_(library, static_cast<int>(AvatarReplica::kTicksAhead)) {
+    : evaluator_(library, static_cast<int>(AvatarReplica::kPosesAhead)) {
   batcher_.Reserve(kBatch);
 }
 
 AvatarReplica::AvatarReplica(std::shared_ptr<const MotionLibrary> library)
-    : body_(std::move(library)), ahead_rotations_(kTicksAhead * body_.pose.rotations.size()) {
+    : body_(std::move(library)), ahead_rotations_(kPosesAhead * body_.pose.rotations.size()) {
   body_.layered_pose = body_.pose;
   body_.layers.Reserve();
 }
@@ -324,9 +324,10 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   reader.Finish();
 }
 
-void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
+void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, const Tick& tick,
                                ReplicaEvaluator& evaluator) {
-  ++evaluator.tick_;
+  STRIDEWIRE_CHECK(tick.ticks_apart >= 1);
+  const auto ticks_apart = static_cast<std::size_t>(tick.ticks_apart);
   for (std::size_t begin = 0; begin < replicas.size(); begin += ReplicaEvaluator::kBatch) {
     const auto batch =
         replicas.subspan(begin, std::min(replicas.size() - begin, ReplicaEvaluator::kBatch));
@@ -335,19 +336,21 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double 
       AvatarReplica& replica = *batch[i];
       STRIDEWIRE_CHECK(&replica.library() == &library);
       if (!replica.is_known_ || !replica.is_moving_) continue;
-      if (!replica.is_time_set_) replica.movement_time_s_ += dt_s;
-      if (replica.ahead_index_ < replica.ahead_count_) continue;
+      if (!replica.is_time_set_) replica.movement_time_s_ += tick.length_s;
+      ++replica.ahead_tick_;
+      if (!tick.has_poses || replica.HasAheadPose()) continue;
       const Movement& movement = replica.body_.movement;
       // Replicas that are next to each other evaluate poses in the same tick, so that they can be
       // evaluated side by side. Different groups of replicas do so in different ticks, to
       // distribute the load.
-      const std::size_t phase = (evaluator.tick_ + i / SoaPose::kLanes) % kTicksAhead;
-      const int count = SampleRunCount(movement, replica.movement_time_s_, dt_s, 1,
-                                       static_cast<int>(kTicksAhead - phase));
-      evaluator.batcher_.Add({&movement, replica.movement_time_s_, dt_s}, count,
-                             static_cast<std::uint32_t>(i));
+      const std::size_t phase = (tick.number / ticks_apart + i / SoaPose::kLanes) % kPosesAhead;
+      const int count = SampleRunCount(movement, replica.movement_time_s_, tick.length_s,
+                                       tick.ticks_apart, static_cast<int>(kPosesAhead - phase));
+      evaluator.batcher_.Add({&movement, replica.movement_time_s_, tick.length_s, tick.ticks_apart},
+                             count, static_cast<std::uint32_t>(i));
       replica.ahead_count_ = static_cast<std::size_t>(count);
-      replica.ahead_index_ = 0;
+      replica.ahead_ticks_apart_ = ticks_apart;
+      replica.ahead_tick_ = 0;
     }
     evaluator.batcher_.Evaluate(
         evaluator.evaluator_,
@@ -363,16 +366,16 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double 
         });
     for (AvatarReplica* replica : batch) {
       if (!replica->is_known_) continue;
-      const std::size_t ahead = replica->is_moving_ ? replica->ahead_index_++ : 0;
       AvatarBody& body = replica->body_;
-      if (!replica->are_layers_set_) body.layers.Advance(library, dt_s);
+      if (!replica->are_layers_set_) body.layers.Advance(library, tick.length_s);
+      replica->is_time_set_ = replica->are_layers_set_ = false;
+      if (!tick.has_poses) continue;
       if (replica->is_moving_ && !body.layers.empty()) {
-        const ConstPoseSpan pose = replica->AheadPose(ahead);
+        const ConstPoseSpan pose = replica->AheadPose();
         body.pose.root_position_m = pose.root_position_m;
         std::ranges::copy(pose.rotations, body.pose.rotations.begin());
       }
       body.ApplyLayers();
-      replica->is_time_set_ = replica->are_layers_set_ = false;
     }
   }
 }

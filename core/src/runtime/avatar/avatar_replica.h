@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -26,7 +27,6 @@ class ReplicaEvaluator {
 
   SoaPoseEvaluator evaluator_;
   EvaluationBatcher batcher_;
-  std::size_t tick_ = 0;  // Number of calls of AdvanceAll.
 };
 
 /// A copy of an avatar that another program simulates. It receives movement records (see
@@ -37,6 +37,14 @@ class ReplicaEvaluator {
 /// with the length of the avatar's tick.
 class AvatarReplica {
  public:
+  /// A tick of AdvanceAll.
+  struct Tick {
+    double length_s = 0.0;     ///< Must be the same until all replicas receive new states.
+    std::uint64_t number = 0;  ///< Must increase by 1 from tick to tick.
+    bool has_poses = true;     ///< False: poses of this tick are not needed.
+    int ticks_apart = 1;       ///< Number of ticks between poses. Other ticks cost more.
+  };
+
   /// The avatar's state is unknown until the replica receives a record with a whole state.
   /// `library` must be the avatar's library.
   explicit AvatarReplica(std::shared_ptr<const MotionLibrary> library);
@@ -52,20 +60,20 @@ class AvatarReplica {
   /// After an error, the avatar's state is unknown until the next record with a whole state.
   [[nodiscard]] Status Apply(std::span<const std::byte> record, FootPlanScratch& scratch);
 
-  /// Advances replicas by one tick and evaluates their poses. All must have the same library, and
-  /// each may occur only once. Replicas without a known state are skipped. A movement that does not
-  /// change is evaluated for several ticks at once, which reads the library less often. Pass the
-  /// replicas in the same order in every tick, because their positions in the list determine in
-  /// which ticks they are evaluated. `dt_s` must be the same in all calls until all replicas
-  /// receive new states.
-  static void AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
+  /// Advances replicas by one tick and evaluates their poses if the tick has poses. All must have
+  /// the same library, and each may occur only once. Replicas without a known state are skipped. A
+  /// movement that does not change is evaluated for several ticks at once, which reads the library
+  /// less often. Pass the replicas in the same order in every tick, because their positions in the
+  /// list and the number of the tick determine in which ticks they are evaluated.
+  static void AdvanceAll(std::span<AvatarReplica* const> replicas, const Tick& tick,
                          ReplicaEvaluator& evaluator);
 
   /// True if the replica has received a state, and no error has occurred since then.
   [[nodiscard]] bool is_known() const { return is_known_; }
-  /// The displayed pose in world space, after AdvanceAll. Undefined unless is_known().
+  /// The displayed pose in world space, after AdvanceAll for a tick with poses. Undefined unless
+  /// is_known().
   [[nodiscard]] ConstPoseSpan pose() const {
-    return is_moving_ && !body_.has_layers ? AheadPose(ahead_index_ - 1) : body_.DisplayedPose();
+    return is_moving_ && !body_.has_layers ? AheadPose() : body_.DisplayedPose();
   }
   /// AvatarSimulation::idle() of the avatar: it stands and has no queued requests.
   [[nodiscard]] bool idle() const { return is_idle_; }
@@ -76,12 +84,17 @@ class AvatarReplica {
  private:
   class Reader;
   friend class ReplicaEvaluator;
-  /// Number of ticks of a movement that are evaluated at once.
-  static constexpr std::size_t kTicksAhead = 8;
+  /// Number of poses of a movement that are evaluated at once.
+  static constexpr std::size_t kPosesAhead = 8;
 
   void ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch);
   void ReadState(unsigned flags, Reader& reader);
-  [[nodiscard]] ConstPoseSpan AheadPose(std::size_t i) const {
+  /// Returns true if the pose of this tick has been evaluated.
+  [[nodiscard]] bool HasAheadPose() const {
+    return ahead_tick_ % ahead_ticks_apart_ == 0 && ahead_tick_ / ahead_ticks_apart_ < ahead_count_;
+  }
+  [[nodiscard]] ConstPoseSpan AheadPose() const {
+    const std::size_t i = ahead_tick_ / ahead_ticks_apart_;
     const std::size_t joints = body_.pose.rotations.size();
     return {ahead_roots_m_[i], std::span(ahead_rotations_).subspan(i * joints, joints)};
   }
@@ -95,12 +108,12 @@ class AvatarReplica {
   // must not advance it.
   bool is_time_set_ = false;
   bool are_layers_set_ = false;
-  // Poses of successive ticks of the movement, without layers.
-  std::array<Vec3, kTicksAhead> ahead_roots_m_ = {};
-  std::vector<Quat> ahead_rotations_;  // [kTicksAhead][joint]
+  // Poses of the movement, without layers, for times that are ahead_ticks_apart_ ticks apart.
+  std::array<Vec3, kPosesAhead> ahead_roots_m_ = {};
+  std::vector<Quat> ahead_rotations_;  // [kPosesAhead][joint]
   std::size_t ahead_count_ = 0;
-  // Index of the next tick's pose. The displayed pose is the one before it.
-  std::size_t ahead_index_ = 0;
+  std::size_t ahead_ticks_apart_ = 1;
+  std::size_t ahead_tick_ = 0;  // Number of ticks since that of the first of these poses.
 };
 
 }  // namespace stridewire
