@@ -26,6 +26,8 @@ constexpr std::size_t kUsualEvents = 3;
 // Phase at which a jump that interrupts another movement starts. The blend from the previous pose
 // replaces the skipped part of the crouch.
 constexpr double kJumpStartPhase = 0.25;
+// A foot that points further away from the heading than this moves next.
+constexpr double kTwistedRad = 0.2;
 
 }  // namespace
 
@@ -387,6 +389,13 @@ DVec3 AvatarSimulation::StandingPosition(Foot foot) const {
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
+// Returns true if a foot points far away from the heading, because the body has turned over it.
+bool AvatarSimulation::IsTwisted(Foot foot) const {
+  if (!body_.plants_feet) return false;
+  const double print_rad = body_.locks[static_cast<std::size_t>(foot)].print.heading_rad;
+  return std::fabs(WrapAngle(print_rad - base_.heading_rad)) > kTwistedRad;
+}
+
 // Returns the height of the ground where a step would land, relative to the ground at the standing
 // foot, in metres.
 double AvatarSimulation::RiseAhead(const StepRequest& step) const {
@@ -421,7 +430,8 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   StepRequest step = std::get<StepRequest>(request.movement);
   if (!step.at) {
     if (options_.terrain != nullptr && body_.plants_feet) step.height_m = RiseAhead(step);
-    const auto plan = PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
+    const bool may_choose_foot = !is_walking_ && !IsTwisted(OtherFoot(last_moved_));
+    const auto plan = PlanStep(*body_.library, step, feet_, last_moved_, may_choose_foot);
     if (!plan || !step.exact_only || !body_.plants_feet) return plan;
     step.foot = MovingFoot(body_.library->group(plan->group).kind);
     step.at = FootprintOf(step);

@@ -282,6 +282,7 @@ class AvatarSimulation {
   void BeginIdleMotion(double left_s, PlanScratch& scratch);
   void EndIdleMotion();
   [[nodiscard]] DVec3 StandingPosition(Foot foot) const;
+  [[nodiscard]] bool IsTwisted(Foot foot) const;
   [[nodiscard]] Vec3 LandingBall(Foot foot) const;
   [[nodiscard]] double StrikeTime() const;
   void ReportFootStrikes(double before_s, double after_s);
