@@ -6,6 +6,7 @@
 #include "base/trig.h"
 #include "offline/base/degrees.h"
 #include "offline/base/text.h"
+#include "offline/complete/upper_body_chains.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire::complete {
@@ -157,7 +158,10 @@ std::optional<StandParts> MeasureStandParts(const RawLibrary& library) {
     });
   }
   if (!average.has_sole(Foot::kLeft) || !average.has_sole(Foot::kRight)) return std::nullopt;
-  return average.parts();
+  StandParts parts = average.parts();
+  const UpperBodyChains chains = FindUpperBodyChains(library.skeleton, parts.mean);
+  parts.mean = LimitLean(library.skeleton, chains, parts.mean);
+  return parts;
 }
 
 Pose ComposeStand(const Skeleton& skeleton, const LegRig& rig, const StandParts& parts) {

@@ -29,7 +29,8 @@ struct StandParts {
 [[nodiscard]] StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides);
 
 /// Measures the parts of a stand in all captured steps, for libraries without level, straight
-/// strides. Returns nullopt if the sole of either foot is never flat on the ground.
+/// strides. The trunk leans no further than in a walk, because the steps may be of another kind.
+/// Returns nullopt if the sole of either foot is never flat on the ground.
 [[nodiscard]] std::optional<StandParts> MeasureStandParts(const RawLibrary& library);
 
 /// Composes a stand pose, with the feet side by side and the knees nearly straight.

@@ -1,12 +1,13 @@
 #include "offline/complete/generic_stride.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "base/trig.h"
-#include "offline/build/pose_error.h"
 #include "offline/builtin/figure.h"
 #include "offline/builtin/step.h"
+#include "offline/complete/upper_body_chains.h"
 
 namespace stridewire::complete {
 namespace {
@@ -14,90 +15,142 @@ namespace {
 // Stride length for the leg length of the generated figure.
 constexpr double kStrideLengthM = 0.55;
 constexpr double kArmSwingRad = 0.2;
-// Minimum length of an upper arm. Collar bones and shoulder blades are shorter.
-constexpr float kUpperArmM = 0.15f;
 
-struct UpperArm {
-  std::size_t joint = 0;  // The joint at the shoulder, which moves the upper arm.
-  bool is_left = false;
+// Positions and world rotations of the generated figure in a pose, in double precision.
+struct FigureSample {
+  PostureSample posture;
+  std::array<DVec3, builtin::kFigureJointCount> positions_m{};
+  std::array<DQuat, builtin::kFigureJointCount> rotations{};
+
+  FigureSample(const Skeleton& figure, const Pose& pose) : posture(SampleOf(figure, pose, 0.0)) {
+    std::vector<Vec3> positions(positions_m.size());
+    std::vector<Quat> world(rotations.size());
+    ForwardKinematics(figure, pose, positions, world);
+    std::ranges::transform(positions, positions_m.begin(), [](const Vec3& p) { return DVec3(p); });
+    std::ranges::transform(world, rotations.begin(), [](const Quat& q) { return DQuat(q); });
+  }
+  [[nodiscard]] DVec3 Hip(Foot foot) const {
+    return positions_m[foot == Foot::kLeft ? builtin::kLeftUpLeg : builtin::kRightUpLeg];
+  }
+  [[nodiscard]] DVec3 Ankle(Foot foot) const {
+    return positions_m[foot == Foot::kLeft ? builtin::kLeftFoot : builtin::kRightFoot];
+  }
 };
 
-// Returns the upper arm of each side: the first bone of the arm, from the trunk outward, that is at
-// least kUpperArmM long. Returns fewer than two if the skeleton has no such bones.
-std::vector<UpperArm> FindUpperArms(const Skeleton& skeleton, const Pose& stand) {
-  const std::vector<BodyPart> parts = FindBodyParts(skeleton, stand);
-  std::vector<Vec3> positions(skeleton.joints.size());
-  std::vector<Quat> rotations(skeleton.joints.size());
-  ForwardKinematics(skeleton, stand, positions, rotations);
-  std::vector<UpperArm> arms;
-  std::vector<bool> is_in_arm(skeleton.joints.size(), false);
-  for (std::size_t j = 1; j < skeleton.joints.size(); ++j) {
-    const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
-    is_in_arm[j] = is_in_arm[parent];
-    if (is_in_arm[j] || parts[parent] != BodyPart::kArms) continue;
-    if (glm::length(skeleton.joints[j].offset_m) < kUpperArmM) continue;
-    arms.push_back({parent, positions[parent].x > positions[0].x});
-    is_in_arm[j] = true;
-  }
-  return arms;
-}
-
-// Rotates an arm about the sideways axis of the body. Positive angles move it forward.
-void SwingArm(const Skeleton& skeleton, const UpperArm& arm, double forward_rad,
-              PostureSample& sample) {
-  DQuat above(1.0, 0.0, 0.0, 0.0);
-  for (int j = skeleton.joints[arm.joint].parent; j >= 0;
-       j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
-    above = sample.rotations[static_cast<std::size_t>(j)] * above;
-  }
-  DQuat& rotation = sample.rotations[arm.joint];
-  rotation = glm::conjugate(above) * builtin::RotateX(-forward_rad) * above * rotation;
-}
-
-PostureSample StandOfFigure(const Skeleton& figure) {
+Pose StandOfFigure(const Skeleton& figure) {
   Pose pose(figure.joint_count());
   builtin::StorePose(builtin::StandingPose(), pose);
-  return SampleOf(figure, pose, 0.0);
+  return pose;
 }
 
-// Returns the root of a sample relative to the midpoint between the balls of the feet.
-DVec3 RootFromBalls(const PostureSample& sample) {
-  return sample.root_m - 0.5 * (sample.balls_m[0] + sample.balls_m[1]);
-}
-
-// Transfers poses of the generated figure to a person. Pelvis and feet of the person deviate from
-// the person's stand pose as those of the figure deviate from its own stand pose. The deviations
-// are scaled with the length of the legs.
+// Transfers poses of the generated figure to a person. Feet, pelvis, chest and head of the person
+// deviate from the person's stand pose as those of the figure deviate from its own stand pose. The
+// hips are placed by the leg on the ground, which is bent as far as the figure's. A person who
+// crouches in the stand pose, for example to fight, therefore walks upright.
 class PoseTransfer {
  public:
-  PoseTransfer(const Skeleton& figure, const PostureSample& stand, double scale)
-      : figure_stand_(StandOfFigure(figure)), stand_(stand), scale_(scale) {}
-
-  [[nodiscard]] PostureSample ToPerson(const PostureSample& from, Foot fixed) const {
-    DVec3 origin = from.balls_m[static_cast<std::size_t>(fixed)];
-    origin.y = 0.0;
-    const DVec3 root = RootFromBalls(stand_);
-    const DVec3 figure_root = RootFromBalls(figure_stand_);
-    PostureSample to = stand_;
-    to.root_m = scale_ * (from.root_m - origin);
-    to.root_m.x += root.x - scale_ * figure_root.x;
-    to.root_m.y = stand_.root_m.y + scale_ * (from.root_m.y - figure_stand_.root_m.y);
-    to.root_m.z += root.z - scale_ * figure_root.z;
-    to.rotations[0] =
-        from.rotations[0] * glm::conjugate(figure_stand_.rotations[0]) * stand_.rotations[0];
-    for (std::size_t f = 0; f < 2; ++f) {
-      to.ankles[f] = from.ankles[f] * glm::conjugate(figure_stand_.ankles[f]) * stand_.ankles[f];
-      to.balls_m[f] = scale_ * (from.balls_m[f] - origin);
-      to.balls_m[f].y =
-          stand_.balls_m[f].y + scale_ * (from.balls_m[f].y - figure_stand_.balls_m[f].y);
+  PoseTransfer(const Skeleton& figure, const Skeleton& skeleton, const LegRig& rig,
+               const PostureSample& stand, double scale)
+      : figure_stand_(figure, StandOfFigure(figure)),
+        skeleton_(skeleton),
+        rig_(rig),
+        chains_(FindUpperBodyChains(skeleton, stand)),
+        stand_(LimitLean(skeleton, chains_, stand)),
+        scale_(scale) {
+    const Pose pose = ToPose(stand);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      LegPose leg;
+      EvaluateLeg(skeleton, rig, pose, foot, leg);
+      const auto ankle = static_cast<std::size_t>(rig.side(foot).ankle);
+      ankle_to_ball_[static_cast<std::size_t>(foot)] =
+          glm::conjugate(DQuat(leg.world_rotations[ankle])) *
+          DVec3(leg.ball_m - leg.positions_m[ankle]);
     }
+  }
+
+  [[nodiscard]] PostureSample ToPerson(const FigureSample& from, Foot fixed) const {
+    DVec3 origin = from.posture.balls_m[static_cast<std::size_t>(fixed)];
+    origin.y = 0.0;
+    PostureSample to = stand_;
+    for (std::size_t f = 0; f < 2; ++f) {
+      const PostureSample& figure = figure_stand_.posture;
+      to.ankles[f] = from.posture.ankles[f] * glm::conjugate(figure.ankles[f]) * stand_.ankles[f];
+      to.balls_m[f] = scale_ * (from.posture.balls_m[f] - origin);
+      to.balls_m[f].y =
+          stand_.balls_m[f].y + scale_ * (from.posture.balls_m[f].y - figure.balls_m[f].y);
+      // Feet that point outward are as far apart at the ankles as those of the figure.
+      const double ankle_x_m = scale_ * from.Ankle(static_cast<Foot>(f)).x;
+      to.balls_m[f].x = ankle_x_m + (to.ankles[f] * ankle_to_ball_[f]).x;
+    }
+    const double fixed_x_m = to.balls_m[static_cast<std::size_t>(fixed)].x;
+    for (DVec3& ball : to.balls_m) ball.x -= fixed_x_m;
+    const auto deviation = [&](int joint) {
+      const auto j = static_cast<std::size_t>(joint);
+      return from.rotations[j] * glm::conjugate(figure_stand_.rotations[j]);
+    };
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const LegRig::Side& side = rig_.side(foot);
+      if (!side.has_toe_joint) continue;
+      const auto f = static_cast<std::size_t>(foot);
+      const auto toe = static_cast<std::size_t>(side.chain.back());
+      const DQuat bend =
+          deviation(foot == Foot::kLeft ? builtin::kLeftToeBase : builtin::kRightToeBase);
+      to.rotations[toe] =
+          glm::conjugate(to.ankles[f]) * bend * stand_.ankles[f] * stand_.rotations[toe];
+    }
+    TurnUpperBody(skeleton_, chains_, stand_,
+                  {.pelvis = deviation(builtin::kHips),
+                   .chest = deviation(builtin::kSpine1),
+                   .head = deviation(builtin::kHead)},
+                  to);
+    PlaceRoot(from, fixed, to);
     return to;
   }
 
+  // Adds the swing of both arms. Positive angles move the arm on the moving foot's side forward.
+  void SwingArms(Foot moving, double forward_rad, PostureSample& sample) const {
+    for (const UpperBodyChains::UpperArm& arm : chains_.upper_arms) {
+      const bool is_on_moving_side = arm.is_left == (moving == Foot::kLeft);
+      SwingArm(skeleton_, arm, is_on_moving_side ? forward_rad : -forward_rad, sample);
+    }
+  }
+
  private:
-  PostureSample figure_stand_;
-  const PostureSample& stand_;
+  void PlaceRoot(const FigureSample& from, Foot fixed, PostureSample& to) const {
+    const auto f = static_cast<std::size_t>(fixed);
+    PostureSample at_origin = to;
+    at_origin.root_m = DVec3(0.0);
+    const Pose pose = ToPose(at_origin);
+    std::array<DVec3, 2> hips_m;  // [Foot]: relative to the root.
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      LegPose leg;
+      EvaluateLeg(skeleton_, rig_, pose, foot, leg);
+      hips_m[static_cast<std::size_t>(foot)] =
+          DVec3(leg.positions_m[static_cast<std::size_t>(rig_.side(foot).hip)]);
+    }
+    const DVec3 middle = 0.5 * (hips_m[0] + hips_m[1]);
+    const DVec3 ankle = to.balls_m[f] - to.ankles[f] * ankle_to_ball_[f];
+    const DVec3 figure_middle = 0.5 * (from.Hip(Foot::kLeft) + from.Hip(Foot::kRight));
+    to.root_m = ankle + scale_ * (figure_middle - from.Ankle(fixed)) - middle;
+
+    const DVec3 figure_leg = from.Hip(fixed) - from.Ankle(fixed);
+    const double extension =
+        std::sqrt(glm::dot(figure_leg, figure_leg)) / (builtin::kThighM + builtin::kShankM);
+    const LegRig::Side& side = rig_.side(fixed);
+    const double reach_m = extension * (side.thigh_m + side.shank_m);
+    const DVec3 leg = to.root_m + hips_m[f] - ankle;
+    const double height_m =
+        std::sqrt(std::max(0.0, reach_m * reach_m - leg.x * leg.x - leg.z * leg.z));
+    to.root_m.y += height_m - leg.y;
+  }
+
+  FigureSample figure_stand_;
+  const Skeleton& skeleton_;
+  const LegRig& rig_;
+  UpperBodyChains chains_;
+  PostureSample stand_;
   double scale_;
+  std::array<DVec3, 2> ankle_to_ball_{};  // [Foot]: in the frame of the ankle.
 };
 
 }  // namespace
@@ -109,26 +162,26 @@ StrideModel GenericStride(const Skeleton& skeleton, const LegRig& rig, const Pos
       figure, moving, builtin::StraightShape(moving, kStrideLengthM, kStrideLengthM), {}, "");
   const LegRig::Side& side = rig.side(moving);
   const double scale = (side.thigh_m + side.shank_m) / (builtin::kThighM + builtin::kShankM);
-  const PoseTransfer transfer(figure, stand, scale);
-  const std::vector<UpperArm> arms = FindUpperArms(skeleton, ToPose(stand));
+  const PoseTransfer transfer(figure, skeleton, rig, stand, scale);
 
   StrideModel model;
   for (std::size_t p = 0; p < kPointCount; ++p) {
     Pose pose(figure.joint_count());
     SampleClip(example.clip, TimeAtPoint(example.keytimes_s, p), pose);
-    PostureSample& point = model.points.emplace_back(
-        transfer.ToPerson(SampleOf(figure, pose, 0.0), OtherFoot(moving)));
-    const double swing_rad = kArmSwingRad * Cos(std::numbers::pi * static_cast<double>(p) /
-                                                static_cast<double>(kPointCount - 1));
-    for (const UpperArm& arm : arms) {
-      // The moving foot is behind at the start, so the arm of its side is in front.
-      const bool is_on_moving_side = arm.is_left == (moving == Foot::kLeft);
-      SwingArm(skeleton, arm, is_on_moving_side ? swing_rad : -swing_rad, point);
-    }
+    PostureSample& point =
+        model.points.emplace_back(transfer.ToPerson(FigureSample(figure, pose), OtherFoot(moving)));
+    // The moving foot is behind at the start, so the arm of its side is in front.
+    transfer.SwingArms(moving,
+                       kArmSwingRad * Cos(std::numbers::pi * static_cast<double>(p) /
+                                          static_cast<double>(kPointCount - 1)),
+                       point);
   }
   std::ranges::copy(example.keytimes_s, model.keytimes_s.begin());
   model.start_length_m = model.end_length_m = scale * kStrideLengthM;
-  model.width_m = scale * builtin::StandWidthM();
+  const auto width_m = [&](const PostureSample& sample) {
+    return std::fabs(sample.balls_m[0].x - sample.balls_m[1].x);
+  };
+  model.width_m = 0.5 * (width_m(model.points.front()) + width_m(model.points.back()));
   return model;
 }
 

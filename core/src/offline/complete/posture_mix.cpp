@@ -51,6 +51,21 @@ DVec3 RootFromFeet(const PostureSample& sample) {
   return sample.root_m - middle;
 }
 
+double LegLength(const Skeleton& skeleton, const LegRig& rig, const PostureSample& sample,
+                 Foot foot) {
+  const auto f = static_cast<std::size_t>(foot);
+  const LegRig::Side& side = rig.side(foot);
+  const auto ankle = static_cast<std::size_t>(side.ankle);
+  LegPose leg;
+  EvaluateLeg(skeleton, rig, ToPose(sample), foot, leg);
+  const DVec3 ankle_to_ball =
+      sample.ankles[f] * (glm::conjugate(DQuat(leg.world_rotations[ankle])) *
+                          DVec3(leg.ball_m - leg.positions_m[ankle]));
+  const DVec3 hip_m = sample.root_m + DVec3(leg.positions_m[static_cast<std::size_t>(side.hip)]);
+  const DVec3 line = hip_m - (sample.balls_m[f] - ankle_to_ball);
+  return std::sqrt(glm::dot(line, line));
+}
+
 Pose ToPose(const PostureSample& sample) {
   Pose pose(static_cast<int>(sample.rotations.size()));
   pose.root_position_m = Vec3(sample.root_m);

@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "runtime/skeleton/leg_rig.h"
 #include "stridewire/base/math.h"
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
@@ -35,6 +36,10 @@ struct PostureSample {
 
 /// Returns the position of the root relative to the ground below the midpoint between the balls.
 [[nodiscard]] DVec3 RootFromFeet(const PostureSample& sample);
+
+/// Returns the distance from hip to ankle that a leg has if its ball is where the sample has it.
+[[nodiscard]] double LegLength(const Skeleton& skeleton, const LegRig& rig,
+                               const PostureSample& sample, Foot foot);
 
 /// Converts to a pose in single precision.
 [[nodiscard]] Pose ToPose(const PostureSample& sample);
