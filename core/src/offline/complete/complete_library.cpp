@@ -136,6 +136,7 @@ std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion)
     completion.has_generic_strides = true;
   }
   complete::JoinStrides(person.strides);
+  complete::MeasureLegs(library.skeleton, person.rig, person.strides);
   return person;
 }
 

@@ -53,6 +53,8 @@ constexpr double kMaxShare = 1.15;
 // Maximum distance from hip to ankle, as a fraction of the leg length. If the legs of the stand
 // pose are straighter, their extension is the maximum.
 constexpr double kMaxExtension = 0.996;
+// Part of the step's duration in which the correction of the fixed leg fades in, and out.
+constexpr double kStanceFade = 0.35;
 
 std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
 
@@ -100,6 +102,7 @@ class StepGenerator {
     const int frames = static_cast<int>(std::floor(end_s_ * kFps + 0.5)) + 1;
     moments_.reserve(static_cast<std::size_t>(frames));
     for (int f = 0; f < frames; ++f) moments_.push_back(MomentAt(f / kFps));
+    StraightenStance();
     PlanSwing();
   }
 
@@ -226,8 +229,10 @@ class StepGenerator {
     captured_ = {first.root_m, stride_.MeasuredStartVelocity(), last.root_m,
                  stride_.MeasuredEndVelocity(), stride_.keytimes_s[3]};
     const auto state = [&](const PostureSample& stride, const DVec3& feet_m, double share) {
-      const DVec3 from_feet = RootFromFeet(person_.stand) +
-                              share * (RootFromFeet(stride) - RootFromFeet(person_.stand));
+      DVec3 from_feet = RootFromFeet(stride) - RootFromFeet(person_.stand);
+      // On straight legs, a body falls with the square of the distance between the feet.
+      from_feet *= DVec3(share, share * share, share);
+      from_feet += RootFromFeet(person_.stand);
       return 0.5 * DVec3(feet_m.x, 0.0, feet_m.z) + from_feet;
     };
     root_.from = state(first, feet_.start_m, start_share_);
@@ -262,6 +267,25 @@ class StepGenerator {
     const double to_fixed_m = -0.5 * (feet_.start_m.x + feet_.end_m.x) * 0.5;
     const DVec3 sway(kSwayShare * (1.0 - share) * to_fixed_m * Bump(time_s / end_s_), 0.0, 0.0);
     return root_.At(time_s) + RotateYaw(heading, deviation + sway);
+  }
+
+  // Raises or lowers the root in single support until the fixed leg is bent as in a blend of the
+  // stand and the captured stride. Blended heights of the root would bend it further, because a
+  // body falls less than in proportion to the length of the step.
+  void StraightenStance() {
+    const auto f = Index(fixed_);
+    const double stand_m = LegLength(person_.skeleton, person_.rig, person_.stand, fixed_);
+    const double fade_s = kStanceFade * end_s_;
+    for (std::size_t i = 0; i < moments_.size(); ++i) {
+      Moment& moment = moments_[i];
+      const double time_s = static_cast<double>(i) / kFps;
+      const double share = std::min(1.0, ShareAt(time_s));
+      const double leg_m = stand_m + share * (stride_.LegAt(moment.generic) - stand_m);
+      const DVec3 hip = moment.root_m + moment.legs[f].hip_m;
+      const double change_m =
+          builtin::HighestHipM(hip, TargetAt(fixed_, moment).ankle_m, leg_m) - hip.y;
+      moment.root_m.y += change_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
+    }
   }
 
   [[nodiscard]] DVec3 PlainBallAt(Foot foot, double time_s, const PostureSample& stride) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/easing.h"
 #include "offline/base/statistics.h"
@@ -191,6 +192,14 @@ std::vector<RawExample> MirrorImages(const RawLibrary& library, const std::vecto
   return images;
 }
 
+// Returns the point before a generic time, and the fraction of the way to the next point.
+std::pair<std::size_t, double> PointAt(double generic_time) {
+  const double at =
+      std::clamp(generic_time, 0.0, static_cast<double>(kIntervals)) * kPointsPerInterval;
+  const int i = std::min(static_cast<int>(at), kPointCount - 2);
+  return {static_cast<std::size_t>(i), at - i};
+}
+
 }  // namespace
 
 double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point) {
@@ -201,11 +210,13 @@ double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point) {
 }
 
 PostureSample StrideModel::At(double generic_time) const {
-  const double at =
-      std::clamp(generic_time, 0.0, static_cast<double>(kIntervals)) * kPointsPerInterval;
-  const int i = std::min(static_cast<int>(at), kPointCount - 2);
-  const auto k = static_cast<std::size_t>(i);
-  return Blend(points[k], points[k + 1], at - i);
+  const auto [k, share] = PointAt(generic_time);
+  return Blend(points[k], points[k + 1], share);
+}
+
+double StrideModel::LegAt(double generic_time) const {
+  const auto [k, share] = PointAt(generic_time);
+  return leg_m[k] + share * (leg_m[k + 1] - leg_m[k]);
 }
 
 DVec3 StrideModel::MeasuredStartVelocity() const {
@@ -259,6 +270,16 @@ void JoinStrides(std::array<StrideModel, 2>& strides) {
     }
     before.end_velocity = after.start_velocity =
         0.5 * (before.MeasuredEndVelocity() + after.MeasuredStartVelocity());
+  }
+}
+
+void MeasureLegs(const Skeleton& skeleton, const LegRig& rig, std::array<StrideModel, 2>& strides) {
+  for (const Foot moving : {Foot::kLeft, Foot::kRight}) {
+    StrideModel& stride = strides[static_cast<std::size_t>(moving)];
+    stride.leg_m.clear();
+    for (const PostureSample& point : stride.points) {
+      stride.leg_m.push_back(LegLength(skeleton, rig, point, OtherFoot(moving)));
+    }
   }
 }
 

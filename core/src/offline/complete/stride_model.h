@@ -27,6 +27,9 @@ struct StrideModel {
   /// Sideways distance of the moving from the fixed foot, outwards; mean of start and end.
   double width_m = 0.0;
 
+  /// [point]: distance from hip to ankle of the fixed leg. Set by MeasureLegs.
+  std::vector<double> leg_m;
+
   /// Velocities of the root at the ends of the stride, in m/s. After JoinStrides, the velocity at
   /// the end of one foot's stride equals that at the start of the other foot's stride.
   DVec3 start_velocity = DVec3(0.0);
@@ -34,6 +37,8 @@ struct StrideModel {
 
   /// Returns the posture at a generic time in [0, 3].
   [[nodiscard]] PostureSample At(double generic_time) const;
+  /// Returns the distance from hip to ankle of the fixed leg at a generic time in [0, 3].
+  [[nodiscard]] double LegAt(double generic_time) const;
   /// Returns the velocity of the root at the start of the mean stride, in m/s.
   [[nodiscard]] DVec3 MeasuredStartVelocity() const;
   [[nodiscard]] DVec3 MeasuredEndVelocity() const;
@@ -43,6 +48,9 @@ struct StrideModel {
 /// of the other are averages of different steps, so they differ. Both get the mean posture and
 /// velocity. The differences are distributed over 45 % of the time of each stride.
 void JoinStrides(std::array<StrideModel, 2>& strides);
+
+/// Measures the fixed legs of both strides, and sets StrideModel::leg_m.
+void MeasureLegs(const Skeleton& skeleton, const LegRig& rig, std::array<StrideModel, 2>& strides);
 
 /// Returns the time of a point of a stride with these keytimes.
 [[nodiscard]] double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point);

@@ -244,6 +244,28 @@ TEST(CompleteLibrary, StridesContinueEachOther) {
   }
 }
 
+// The height of the hips changes with the square of the distance between the feet. If it changed in
+// proportion, the knees would be bent in short steps.
+TEST(CompleteLibrary, ShortStepsKeepTheHeightOfTheHips) {
+  const RawLibrary library = Completed(WalkWithoutStop());
+  const RawGroup& straight = *CompletedGroups(library).front();
+  ASSERT_EQ(straight.parameters[0], ParameterName::kStartZ);
+  const auto fall_m = [&](const RawExample& example) {
+    return library.stand_pose.root_position_m.y - example.clip.frame(0).root_position_m.y;
+  };
+  const auto start_m = [](const RawExample& example) { return -example.parameters[0]; };
+  const RawExample& longest = *std::ranges::max_element(straight.examples, {}, start_m);
+  ASSERT_GT(std::fabs(fall_m(longest)), 0.01f);
+  int short_steps = 0;
+  for (const RawExample& example : straight.examples) {
+    const double part = start_m(example) / start_m(longest);
+    if (part < 0.4 || part > 0.55) continue;
+    EXPECT_LT(fall_m(example) / fall_m(longest), 0.4f) << example.source;
+    ++short_steps;
+  }
+  EXPECT_GT(short_steps, 0);
+}
+
 // The same steps result from captures whose joints have other frames.
 TEST(CompleteLibrary, DoesNotDependOnTheAxesOfJoints) {
   const RawLibrary raw = WalkWithoutStop();
