@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -110,6 +111,40 @@ void ExpectAnEvenWalk(const Library& library) {
   // The last step ends in the stride of the stand pose.
   EXPECT_LE(longest_m - shortest_m, 0.2);
   EXPECT_LE(FeetApartFromStandM(avatar), 0.03);
+}
+
+// Returns the mean time of the steps of a walk of 8 m, without the first two and the last two.
+double MeanStepS(const Library& library, std::optional<double> speed_m_s) {
+  AvatarSimulation avatar(library, BaseFrame{});
+  WalkRequest goal{.position_m = {0.0, 0.0, 8.0}};
+  goal.speed_m_s = speed_m_s;
+  EXPECT_TRUE(avatar.Enqueue({1, goal}).has_value());
+  std::vector<double> started_s;
+  for (double time_s = 0.0; time_s < 60.0 && !(time_s > 0.0 && avatar.idle()); time_s += kTickS) {
+    avatar.Advance(kTickS);
+    for (const AvatarEvent& event : avatar.events()) {
+      if (event.type == AvatarEventType::kStarted && IsStep(event.kind))
+        started_s.push_back(time_s);
+    }
+  }
+  EXPECT_GT(started_s.size(), 8u);
+  return (started_s[started_s.size() - 3] - started_s[2]) /
+         static_cast<double>(started_s.size() - 5);
+}
+
+// Steps of `builtin` take 0.55 to 0.6 s. If captured steps take longer, they are played faster,
+// unless the caller asks for a speed.
+TEST(WalkFit, SlowStepsArePlayedFasterWithoutARequestedSpeed) {
+  RawLibrary raw = GenerateBuiltinLibrary();
+  for (RawGroup& group : raw.groups) {
+    for (RawExample& example : group.examples) {
+      example.clip.fps /= 1.4;
+      for (double& keytime_s : example.keytimes_s) keytime_s *= 1.4;
+    }
+  }
+  const Library slow = LibraryBuilder().Build(raw).value();
+  EXPECT_LT(MeanStepS(slow, std::nullopt), 0.65);
+  EXPECT_GT(MeanStepS(slow, 0.6), 0.72);
 }
 
 TEST(WalkFit, LibraryWithoutStartAndStopWalksEvenly) { ExpectAnEvenWalk(StridesOf(0.35, true)); }

@@ -28,6 +28,11 @@ struct RequestTarget {
   double turn_rad = 0.0;  ///< Change of heading.
 };
 
+/// Limits for the steps of avatars in a hurry. In captures, the quickest steps of people who turn,
+/// stop or walk briskly take 0.4 to 0.5 s.
+inline constexpr double kQuickStepS = 0.5;
+inline constexpr double kHurriedRate = 1.6;
+
 /// A request expressed as a group of the library and parameters of that group.
 struct RequestPlan {
   int group = -1;
@@ -47,8 +52,9 @@ struct RequestPlan {
   bool is_side_given = false;  ///< Steps: true if the request specified the side.
   bool is_varied = true;       ///< Steps: true if the step may be varied (see StrideVariation).
   /// Maximum playback speed. The movement is played only as fast as is necessary to shorten it to
-  /// kQuickStepS.
+  /// `brisk_s`.
   double max_rate = 1.0;
+  double brisk_s = kQuickStepS;
   /// True if `applied` differs from `requested` by more than 1e-6.
   bool clamped = false;
   /// Distance between `applied` and `requested` in metres. A radian counts as 0.5 m.
@@ -66,11 +72,6 @@ inline constexpr double kHullGrowth = 0.1;
 /// libraries without steps in place, this is the only way to close the feet and to turn on the
 /// spot.
 inline constexpr double kMaxPlantedErrorM = 0.6;
-
-/// Limits for the steps of avatars in a hurry. In captures, the quickest steps of people who turn,
-/// stop or walk briskly take 0.4 to 0.5 s.
-inline constexpr double kQuickStepS = 0.5;
-inline constexpr double kHurriedRate = 1.6;
 
 /// Plans a step in the group that covers it best, with parameters clamped to the hull of the group.
 /// The feet dictate the start, which has a larger weight than the end. If a group has no parameter
