@@ -124,7 +124,7 @@ export async function serveModule(contents, resolveDir, files = {}) {
     ...files,
   };
   const listener = http.createServer(({url}, response) => {
-    const [type, content] = all[url] ?? ['text/plain', null];
+    const [type, content] = all[url.split('?')[0]] ?? ['text/plain', null];
     response.writeHead(content === null ? 404 : 200, {'Content-Type': type});
     response.end(content ?? 'not found');
   });
