@@ -1,7 +1,7 @@
 // The library page: shows which parameters a library's groups of examples cover and how accurately,
 // and synthesizes the step for any parameters.
 
-import {Slider, button, degrees, h, setPressed, setText} from '../dom.js';
+import {Slider, button, degrees, h, icon, setPressed, setText} from '../dom.js';
 import type {RendererInfo} from '../renderer.js';
 import {applyTheme, makeColours, preferredTheme, rememberTheme} from '../theme.js';
 import type {ThemeName} from '../theme.js';
@@ -76,6 +76,11 @@ export class LibraryPage {
     type: 'range', id: 'time', min: 0, max: 1, step: 0.001, value: 0, 'aria-label': 'Time'});
   private readonly timeText = h('span', {class: 'delay'});
   private readonly playButton: HTMLButtonElement;
+  private readonly themeButton = button(
+    'Switch theme', {icon: 'sun', text: false, class: 'round'}, () => {
+      this.setTheme(this.theme === 'dark' ? 'light' : 'dark');
+      rememberTheme(this.theme);
+    });
   private readonly captions =
     [h('span', {class: 'name'}, 'Synthesized'), h('span', {class: 'name'})];
   private readonly sliderByParameter = new Map<number, Slider>();
@@ -104,15 +109,11 @@ export class LibraryPage {
       ...[1, 0.5, 0.25].map((v) => h('option', {value: v}, `${v}×`)));
     speed.addEventListener('change', () => (this.speed = Number(speed.value)));
     this.theme = preferredTheme();
-    const theme = button('Switch theme', {icon: 'sun', text: false, class: 'round'}, () => {
-      this.setTheme(this.theme === 'dark' ? 'light' : 'dark');
-      rememberTheme(this.theme);
-    });
     this.message.hidden = true;
     root.replaceChildren(
       h('header', {class: 'library-header'},
         h('h1', {}, 'Library'), this.librarySelect, this.groupSelect,
-        h('a', {class: 'link', href: `./${location.search}`}, 'Worlds'), theme),
+        h('a', {class: 'link', href: `./${location.search}`}, 'Worlds'), this.themeButton),
       h('div', {class: 'library-layout'},
         h('section', {class: 'parameter-area', 'aria-label': 'Parameters'},
           this.summaryArea,
@@ -356,6 +357,7 @@ export class LibraryPage {
   private setTheme(name: ThemeName): void {
     this.theme = name;
     this.preview.setBackground(applyTheme(name, this.colours));
+    this.themeButton.replaceChildren(icon(name === 'dark' ? 'sun' : 'moon'));
   }
 
   private showMessage(text: string): void {
