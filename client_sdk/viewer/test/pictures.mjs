@@ -1,9 +1,10 @@
-// Takes the viewer screenshots of docs/pictures from a running demo server:
+// Takes the screenshots of docs/pictures from a running demo server, as WebP files:
 //
 //   node test/pictures.mjs http://127.0.0.1:7421/ ../../docs/pictures [NAME]
 //
 // With NAME, takes only pictures whose names contain it.
 
+import {writeFileSync} from 'node:fs';
 import {join} from 'node:path';
 
 import {launch} from './browser.mjs';
@@ -30,8 +31,25 @@ async function picture(name, width, height, colorScheme, query, prepare) {
     await page.waitForTimeout(6000);
   }
   if (prepare) await prepare(page);
-  const file = join(folder, `${name}.png`);
-  await page.screenshot({path: file});
+  await save(page, name);
+}
+
+async function libraryPicture(name, width, height, colorScheme) {
+  if (!name.includes(part)) return;
+  const page = await browser.newPage({viewport: {width, height}, colorScheme,
+    hasTouch: width < 500});
+  page.on('pageerror', (error) => console.error(name, error.message));
+  await page.goto(new URL('library.html', url).href);
+  await page.locator('.preview').first().waitFor();
+  await page.waitForTimeout(6000);
+  await save(page, name);
+}
+
+async function save(page, name) {
+  const file = join(folder, `${name}.webp`);
+  const tools = await page.context().newCDPSession(page);
+  const {data} = await tools.send('Page.captureScreenshot', {format: 'webp', quality: 90});
+  writeFileSync(file, Buffer.from(data, 'base64'));
   console.log(file);
   await page.close();
 }
@@ -39,6 +57,7 @@ async function picture(name, width, height, colorScheme, query, prepare) {
 for (const [width, height] of sizes) {
   for (const theme of ['dark', 'light']) {
     await picture(`viewer_${width}x${height}_${theme}`, width, height, theme, bothWorlds);
+    await libraryPicture(`library_${width}x${height}_${theme}`, width, height, theme);
   }
 }
 const inspect = async (page) => {
