@@ -136,12 +136,35 @@ double TimeWarp::TimeAt(double grid_position) const {
   for (std::size_t i = 1; i < n; ++i) {
     if (grid_position == knots_[i].position) return knots_[i].time_s;
   }
+  // Newton's method finds the time approximately. The bisection then evaluates the map only where
+  // this approximation does not decide.
+  constexpr double kErrorS = 1e-9;
+  std::size_t i = 0;
+  while (knots_[i + 1].position < grid_position) ++i;
+  const double h = knots_[i + 1].time_s - knots_[i].time_s;
+  const double rise = knots_[i + 1].position - knots_[i].position;
+  const double m0 = knots_[i].slope * h;
+  const double m1 = knots_[i + 1].slope * h;
+  const double quadratic = 3.0 * rise - 2.0 * m0 - m1;
+  const double cubic = m0 + m1 - 2.0 * rise;
+  double s = (grid_position - knots_[i].position) / rise;
+  for (int k = 0; k < 4; ++k) {
+    const double value = knots_[i].position + s * (m0 + s * (quadratic + s * cubic));
+    const double slope = m0 + s * (2.0 * quadratic + 3.0 * s * cubic);
+    s = std::clamp(s + (grid_position - value) / slope, 0.0, 1.0);
+  }
+  const double near_s = knots_[i].time_s + s * h;
+  const bool is_near = GridPosition(near_s - kErrorS) < grid_position &&
+                       GridPosition(near_s + kErrorS) >= grid_position;
   double low = knots_[0].time_s;
   double high = knots_[n].time_s;
   while (high - low > 1e-12) {
     const double middle = 0.5 * (low + high);
     if (middle <= low || middle >= high) break;
-    (GridPosition(middle) < grid_position ? low : high) = middle;
+    const bool is_before = is_near && std::fabs(middle - near_s) > kErrorS
+                               ? middle < near_s
+                               : GridPosition(middle) < grid_position;
+    (is_before ? low : high) = middle;
   }
   return 0.5 * (low + high);
 }
