@@ -19,9 +19,14 @@ struct Moment {
   std::vector<DVec3> velocities_m_s;
 };
 
-double RootMeanSquareM(const std::vector<DVec3>& a, const std::vector<DVec3>& b) {
+// Returns the root mean square of the distances. If it is above `limit_m`, may return any value
+// above that limit.
+double RootMeanSquareM(const std::vector<DVec3>& a, const std::vector<DVec3>& b, double limit_m) {
+  const double limit = limit_m * limit_m * static_cast<double>(a.size()) * (1.0 + 1e-9);
   double sum = 0.0;
-  for (std::size_t j = 0; j < a.size(); ++j) sum += glm::dot(a[j] - b[j], a[j] - b[j]);
+  for (std::size_t j = 0; j < a.size() && !(sum > limit); ++j) {
+    sum += glm::dot(a[j] - b[j], a[j] - b[j]);
+  }
   return std::sqrt(sum / static_cast<double>(a.size()));
 }
 
@@ -127,10 +132,11 @@ Transition Nearest(const std::vector<Moment>& ends, const std::vector<Moment>& s
   double least_m = HUGE_VAL;
   for (const Moment& end : ends) {
     for (const Moment& start : starts) {
-      double distance_m = RootMeanSquareM(end.joints_m, start.joints_m);
+      double distance_m = RootMeanSquareM(end.joints_m, start.joints_m, least_m);
       if (distance_m >= least_m) continue;
       distance_m +=
-          kTransitionVelocityS * RootMeanSquareM(end.velocities_m_s, start.velocities_m_s);
+          kTransitionVelocityS * RootMeanSquareM(end.velocities_m_s, start.velocities_m_s,
+                                                 (least_m - distance_m) / kTransitionVelocityS);
       if (distance_m >= least_m) continue;
       least_m = distance_m;
       nearest = {static_cast<float>(distance_m), end.example, start.example};
