@@ -463,7 +463,7 @@ void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_
   BeginMovement(plan, request_id);
 }
 
-// Plans a movement. If it replaces a step of the same foot, it starts at the phase of that step.
+// Plans a movement that starts at a phase (StepPhase), for example that of the step it replaces.
 void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
                                     PlanScratch& scratch) {
   STRIDEWIRE_CHECK(&scratch.feet.library() == body_.library.get());

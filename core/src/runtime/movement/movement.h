@@ -38,7 +38,8 @@ struct Movement {
   BaseFrame base;
   /// Turn in addition to that of the examples, eased over the movement.
   double extra_turn_rad = 0.0;
-  /// Time in the movement at which it begins. Above 0 if it continues a redirected swing.
+  /// Time in the movement at which it begins. Above 0 if it continues a redirected swing, if it is
+  /// a jump that interrupts another movement, and for idle motion.
   double start_offset_s = 0.0;
   double ease_out_s = kEaseOutS;     ///< T = min(MotionGroup::ease_out_s, duration).
   double rate = 1.0;                 ///< Playback speed relative to the examples, > 0.

@@ -265,9 +265,9 @@ class Planner {
     return std::clamp(0.0, lowest.min_m, highest.max_m);
   }
 
-  // Returns by how much the soles of the blended pose must be raised at the end of the movement,
-  // [foot], so that they stand on ground at height `ground_m`. Otherwise, blends of very different
-  // steps would end with a foot above or below the ground.
+  // Returns by how much the soles of the blended pose must be raised at the end of a jump, [foot],
+  // so that they stand on ground at height `ground_m`. Otherwise, blends of very different jumps
+  // would end with a foot above or below the ground.
   std::array<double, 2> EndLevelling(double ground_m) const {
     std::array<double, 2> raise_m{};
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

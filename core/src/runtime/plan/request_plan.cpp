@@ -32,8 +32,8 @@ constexpr double kTieM = 1e-5;
 // much.
 constexpr double kFootPreferenceM = 0.01;
 
-// Additional cost of a group with turn, side or height parameters for a step that requests none of
-// them. Such parameters take arbitrary values and would bend a straight walk.
+// Additional cost of a group with turn, side or height parameters for a request that specifies none
+// of them. Such parameters take arbitrary values and would bend a straight walk.
 constexpr double kStraightPreferenceM = 0.15;
 // Additional cost of a group whose steps were generated because the captures lack them. Captured
 // steps are preferred if they fit nearly as well.
@@ -92,7 +92,7 @@ ParameterGoal& At(ParameterGoals& goals, ParameterName name) {
   return goals[static_cast<std::size_t>(name)];
 }
 
-// True if a group has parameters other than those of straight steps on level ground.
+// Returns true if a group has parameters other than those of straight steps on level ground.
 bool IsGeneral(const MotionGroup& group) {
   for (const ParameterName name :
        {ParameterName::kTurn, ParameterName::kStartX, ParameterName::kEndX, ParameterName::kStartY,

@@ -54,8 +54,8 @@ struct TransitionPath {
 /// - No step is inserted if the request would still be out of reach after it (RequestError). The
 ///   plan of a request that begins at once may be out of reach.
 ///
-/// The search is breadth-first, with at most 14 calls of PlanStep and 15 more for the request.
-/// Never allocates.
+/// The search tries one inserted step first, then two, then three. It plans at most 22 steps to
+/// insert, and the request at most 15 times. Never allocates.
 [[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library,
                                                 const MovementRequest& request,
                                                 const std::optional<RequestPlan>& direct,

@@ -31,8 +31,8 @@ constexpr double kAimedM = 0.02;
 constexpr double kAimedRad = 0.5;
 constexpr double kAimedBodyRad = 0.25;
 
-// Effort of turning by one radian, in metres. Within kNearM of the goal the direction of the path
-// has a smaller weight, because the last steps may lead in any direction.
+// Effort of turning by one radian, in metres. The direction of a part of the path that is shorter
+// than kNearM has a smaller weight, because a few steps may lead in any direction.
 constexpr double kTurnEffort = 0.3;
 constexpr double kNearM = 0.5;
 // Effort of moving one metre sideways or backward, in metres.
