@@ -76,8 +76,9 @@ class SendQueue {
   };
 
   /// Clears `out` and moves waiting frames to it: up to `max_bytes` of control messages, one
-  /// terrain if no control message waits, then up to `max_bytes` of movements and up to `max_bytes`
-  /// of poses. At least one waiting frame of each kind is taken, so a large frame cannot block.
+  /// terrain if no control message is left, then up to `max_bytes` of movements and up to
+  /// `max_bytes` of poses. At least one waiting frame of control, movements and poses is taken,
+  /// however large it is.
   void Gather(std::size_t max_bytes, Gathered& out);
 
   [[nodiscard]] bool empty() const {
