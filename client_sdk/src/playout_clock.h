@@ -11,7 +11,7 @@ namespace stridewire::client {
 /// the display shows server time l - d. It is not ahead of the newest pose if d is at least the
 /// offset of the next message plus the interval of the messages. The target of d is therefore
 ///
-///   the kQuantile-quantile of the offsets of the last kWindowS + (1 + kMargin) * interval
+///   quantile(kQuantile, offsets of the last kWindowS) + (1 + kMargin) * interval
 ///
 /// d approaches the target at a rate of at most kMaxRate, so the display runs at most 5 % faster or
 /// slower than the server. It jumps only if the server's clock has changed, if all messages of the
