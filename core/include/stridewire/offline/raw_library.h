@@ -14,6 +14,8 @@ namespace stridewire {
 /// foot. The clip covers [0, last keytime] and may contain later frames.
 struct RawExample {
   Clip clip;
+  /// [frame]: times of the frames of `clip`, if they are not evenly spaced. They increase from 0.
+  std::vector<double> frame_times_s;
   std::vector<double> keytimes_s;   ///< K_0 = 0 < ... < K_n.
   std::vector<double> parameters;   ///< One value per parameter in RawGroup::parameters.
   double heading_change_rad = 0.0;  ///< Heading at the end relative to the start.

@@ -23,19 +23,9 @@ constexpr double kTie = 1e-5;
 constexpr int kSamples = 24;  // Number of samples per interval and example.
 static_assert(kMaxCells * kMaxIntervals < MotionLibrary::kMaxGridPoints);
 
-struct IntervalLength {
-  double mean_s = 0.0;
-  double max_s = 0.0;
-};
-
-IntervalLength LengthOf(const RawGroup& group, std::size_t interval) {
-  IntervalLength length;
-  for (const RawExample& example : group.examples) {
-    const double length_s = example.keytimes_s[interval + 1] - example.keytimes_s[interval];
-    length.mean_s += length_s / static_cast<double>(group.examples.size());
-    length.max_s = std::max(length.max_s, length_s);
-  }
-  return length;
+int CellsIn(double length_s, double fps) {
+  const double exact = std::clamp(length_s * fps, double{kMinCells}, double{kMaxCells});
+  return static_cast<int>(std::ceil(exact - 0.5 - kTie));
 }
 
 // Returns the error of the stored example for each interval: the mean over joints and time, in
@@ -63,7 +53,7 @@ std::vector<double> StoredErrors(const RawExample& example, const std::vector<in
     for (int s = 0; s < kSamples; ++s) {
       const double t = from_s + length_s * (s + 0.5) / kSamples;
       EvaluateBlend(alone, layout, movement, t, cache, played);
-      SampleClip(example.clip, t, captured);
+      SampleExample(example, t, captured);
       for (std::size_t j = 0; j < played.rotations.size(); ++j) {
         errors[i] += AngleBetween(played.rotations[j], captured.rotations[j]);
       }
@@ -75,25 +65,37 @@ std::vector<double> StoredErrors(const RawExample& example, const std::vector<in
 
 }  // namespace
 
+std::vector<int> CellsAtRate(const std::vector<std::vector<double>>& keytimes_s, double fps) {
+  std::vector<int> cells;
+  for (std::size_t i = 0; i + 1 < keytimes_s.front().size(); ++i) {
+    double mean_s = 0.0;
+    for (const std::vector<double>& keys : keytimes_s) {
+      mean_s += (keys[i + 1] - keys[i]) / static_cast<double>(keytimes_s.size());
+    }
+    cells.push_back(CellsIn(mean_s, fps));
+  }
+  return cells;
+}
+
 std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout& layout,
                              const Quat& stand_root) {
   STRIDEWIRE_CHECK(!group.examples.empty());
-  const std::size_t intervals = group.examples.front().keytimes_s.size() - 1;
-  double clip_fps = 0.0;
-  for (const RawExample& example : group.examples) clip_fps = std::max(clip_fps, example.clip.fps);
-  std::vector<int> cells(intervals);
-  std::vector<int> most(intervals);
-  for (std::size_t i = 0; i < intervals; ++i) {
-    const IntervalLength length = LengthOf(group, i);
-    const auto cells_at = [](double length_s, double rate) {
-      const double exact = std::clamp(length_s * rate, double{kMinCells}, double{kMaxCells});
-      return static_cast<int>(std::ceil(exact - 0.5 - kTie));
-    };
-    cells[i] = cells_at(length.mean_s, fps);
-    most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
-  }
+  std::vector<std::vector<double>> keytimes_s;
+  for (const RawExample& example : group.examples) keytimes_s.push_back(example.keytimes_s);
+  std::vector<int> cells = CellsAtRate(keytimes_s, fps);
   // Generated steps are so smooth that they never need more cells.
   if (group.is_completed) return cells;
+  double clip_fps = 0.0;
+  for (const RawExample& example : group.examples) clip_fps = std::max(clip_fps, example.clip.fps);
+  const std::size_t intervals = cells.size();
+  std::vector<int> most(intervals);
+  for (std::size_t i = 0; i < intervals; ++i) {
+    double max_s = 0.0;
+    for (const std::vector<double>& keys : keytimes_s) {
+      max_s = std::max(max_s, keys[i + 1] - keys[i]);
+    }
+    most[i] = std::max(cells[i], CellsIn(max_s, clip_fps));
+  }
   // Cells are added but never removed, so an example whose error is small is not measured again.
   std::vector<const RawExample*> rough;
   for (const RawExample& example : group.examples) rough.push_back(&example);

@@ -7,6 +7,11 @@
 
 namespace stridewire {
 
+// Returns the number of cells per keytime interval for a grid with about `fps` cells per second of
+// the mean interval. `keytimes_s` contains the keytimes of each example.
+[[nodiscard]] std::vector<int> CellsAtRate(const std::vector<std::vector<double>>& keytimes_s,
+                                           double fps);
+
 // Maximum error of a stored example, in radians: the mean over joints and time.
 inline constexpr double kStoredErrorRad = 0.45 / 57.29577951308232;
 

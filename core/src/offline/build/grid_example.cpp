@@ -35,6 +35,23 @@ std::size_t MedoidIndex(const std::vector<GridExample>& examples) {
 
 }  // namespace
 
+void SampleExample(const RawExample& example, double time_s, PoseSpan out) {
+  const Clip& clip = example.clip;
+  const std::vector<double>& times_s = example.frame_times_s;
+  if (times_s.empty()) return SampleClip(clip, time_s, out);
+  const auto after = std::ranges::lower_bound(times_s, time_s);
+  const auto f = std::min(after - times_s.begin(), std::ssize(times_s) - 1);
+  if (f == 0 || times_s[static_cast<std::size_t>(f)] <= time_s) {
+    const ConstPoseSpan frame = clip.frame(static_cast<int>(f));
+    out.root_position_m = frame.root_position_m;
+    std::ranges::copy(frame.rotations, out.rotations.begin());
+    return;
+  }
+  const auto i = static_cast<std::size_t>(f);
+  const double part = (time_s - times_s[i - 1]) / (times_s[i] - times_s[i - 1]);
+  SampleClip(clip, (static_cast<double>(i - 1) + part) / clip.fps, out);
+}
+
 GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                            const GridLayout& layout, const Quat& stand_root) {
   STRIDEWIRE_CHECK(example.keytimes_s.size() == cells.size() + 1);
@@ -55,7 +72,7 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
   Pose pose(example.clip.joint_count);
   double yaw_rad = 0.0;
   for (int p = 0; p < point_count; ++p) {
-    SampleClip(example.clip, warp.TimeAt(p), pose);
+    SampleExample(example, warp.TimeAt(p), pose);
     float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
     double wrapped_rad = yaw_rad;
     // If the root is nearly vertical, HeadingOf leaves the previous yaw unchanged.

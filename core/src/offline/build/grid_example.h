@@ -18,6 +18,9 @@ struct GridExample {
   bool mirrored = false;
 };
 
+// Samples the clip of an example. At the time of a frame, returns that frame without any change.
+void SampleExample(const RawExample& example, double time_s, PoseSpan out);
+
 // Samples an example at the grid points, using its own keytimes. `stand_root` is the rotation of
 // the root in the stand pose, in which the heading is 0. It compensates for the axes of the root's
 // frame.

@@ -43,7 +43,14 @@ Status ValidateExample(const RawGroup& group, const RawExample& example, int joi
     return failed(ErrorCode::kShapeMismatch,
                   "the example has another number of keytimes than its group");
   }
-  if (example.keytimes_s.back() > example.clip.duration_s() + 1e-6) {
+  const std::vector<double>& frame_times_s = example.frame_times_s;
+  if (!frame_times_s.empty() &&
+      frame_times_s.size() != static_cast<std::size_t>(example.clip.frame_count())) {
+    return failed(ErrorCode::kShapeMismatch, "expected one frame time per frame of the clip");
+  }
+  const double duration_s =
+      frame_times_s.empty() ? example.clip.duration_s() : frame_times_s.back();
+  if (example.keytimes_s.back() > duration_s + 1e-6) {
     return failed(ErrorCode::kOutOfRange, "the last keytime is after the end of the clip");
   }
   if (example.parameters.size() != group.parameters.size()) {

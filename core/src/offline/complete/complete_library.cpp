@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "offline/base/parallel.h"
 #include "offline/base/text.h"
+#include "offline/build/grid_cells.h"
 #include "offline/builtin/figure.h"
 #include "offline/complete/basic_steps.h"
 #include "offline/complete/compose_stand.h"
@@ -23,6 +25,7 @@ namespace {
 using complete::BasicStep;
 using complete::BasicStepGroup;
 using complete::Person;
+using complete::StepSpec;
 using complete::StrideModel;
 
 // Maximum tilt of the soles in a stand.
@@ -140,24 +143,41 @@ std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion)
   return person;
 }
 
-void AddGroup(const BasicStepGroup& basic, const Person& person, RawLibrary& library,
-              Completion& completion) {
-  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    const std::vector<BasicStep>& steps = basic.steps[static_cast<std::size_t>(foot)];
-    RawGroup group;
-    group.kind = StepKind(foot);
-    group.parameters = basic.parameters;
-    group.is_completed = true;
-    group.examples.resize(steps.size());
-    ParallelFor(static_cast<int>(steps.size()), 1, ThreadCount(0), [&](int i, int) {
-      const BasicStep& step = steps[static_cast<std::size_t>(i)];
-      const auto make = step.is_backward ? complete::MakeBackwardStep : complete::MakeStep;
-      group.examples[static_cast<std::size_t>(i)] =
-          make(person, foot, step.feet, basic.parameters, SourceOf(step));
-    });
-    completion.example_count += static_cast<int>(group.examples.size());
-    library.groups.push_back(std::move(group));
+// Generates the steps of several groups, as new groups of the library.
+void AddGroups(std::span<const BasicStepGroup> groups, const Person& person, double grid_fps,
+               RawLibrary& library, Completion& completion) {
+  struct Task {
+    const BasicStep* step = nullptr;
+    StepSpec spec;
+    std::size_t group = 0;
+    std::size_t example = 0;
+  };
+  std::vector<Task> tasks;
+  std::vector<std::vector<int>> cells(library.groups.size());
+  for (const BasicStepGroup& basic : groups) {
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const std::vector<BasicStep>& steps = basic.steps[static_cast<std::size_t>(foot)];
+      std::vector<std::vector<double>> keytimes_s;
+      for (const BasicStep& step : steps) {
+        const StepSpec spec = {foot, step.feet, step.is_backward};
+        tasks.push_back({&step, spec, library.groups.size(), keytimes_s.size()});
+        keytimes_s.push_back(complete::StepKeytimes(person, spec));
+      }
+      cells.push_back(CellsAtRate(keytimes_s, grid_fps));
+      RawGroup& group = library.groups.emplace_back();
+      group.kind = StepKind(foot);
+      group.parameters = basic.parameters;
+      group.is_completed = true;
+      group.examples.resize(steps.size());
+    }
   }
+  ParallelFor(static_cast<int>(tasks.size()), 1, ThreadCount(0), [&](int i, int) {
+    const Task& task = tasks[static_cast<std::size_t>(i)];
+    RawGroup& group = library.groups[task.group];
+    group.examples[task.example] = complete::MakeStep(person, task.spec, cells[task.group],
+                                                      group.parameters, SourceOf(*task.step));
+  });
+  completion.example_count = static_cast<int>(tasks.size());
 }
 
 std::string Joined(const std::vector<std::string>& parts) {
@@ -170,14 +190,15 @@ std::string Joined(const std::vector<std::string>& parts) {
 
 }  // namespace
 
-Completion CompleteLibrary(RawLibrary& library) {
+Completion CompleteLibrary(RawLibrary& library, double grid_fps) {
   Completion completion;
   if (library.groups.empty()) return completion;
   completion.only_foot = OnlyFootOf(library);
   const std::optional<Person> person = MeasurePerson(library, completion);
   if (!person) return completion;
   LackingList lacking;
-  for (const BasicStepGroup& group : complete::BasicSteps(*person)) {
+  std::vector<BasicStepGroup> needed;
+  for (BasicStepGroup& group : complete::BasicSteps(*person)) {
     bool is_needed = false;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const double stand_side_m = person->StandVector(foot).x;
@@ -188,8 +209,9 @@ Completion CompleteLibrary(RawLibrary& library) {
         is_needed = true;
       }
     }
-    if (is_needed) AddGroup(group, *person, library, completion);
+    if (is_needed) needed.push_back(std::move(group));
   }
+  AddGroups(needed, *person, grid_fps, library, completion);
   completion.lacking = lacking.Texts();
   if (completion.has_composed_stand) {
     completion.lacking.insert(completion.lacking.begin(), "a stand with the feet side by side");

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire {
@@ -33,7 +34,10 @@ struct Completion {
 /// do not change. The sources of their examples begin with kCompletedSource. If the captures
 /// contain no stand with both feet side by side, the stand pose is composed from the mean posture
 /// of the steps.
-Completion CompleteLibrary(RawLibrary& library);
+///
+/// The clips of generated examples have a frame at each grid point of a library that LibraryBuilder
+/// builds with this `grid_fps`.
+Completion CompleteLibrary(RawLibrary& library, double grid_fps = LibraryBuilder().grid_fps);
 
 /// Returns sentences for users, for example "The captures lack stops and steps backward."
 [[nodiscard]] std::vector<std::string> DescribeCompletion(const Completion& completion);

@@ -1,29 +1,29 @@
 #include "offline/complete/posture_mix.h"
 
-#include <cmath>
-
 namespace stridewire::complete {
-
-DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b) {
-  const double sign = glm::dot(a, b) < 0.0 ? -1.0 : 1.0;
-  const DQuat sum = a * (1.0 - share_of_b) + b * (sign * share_of_b);
-  const double length = std::sqrt(glm::dot(sum, sum));
-  return length > 1e-9 ? sum * (1.0 / length) : a;
-}
 
 PostureSample Blend(const PostureSample& a, const PostureSample& b, double share_of_b) {
   PostureSample out;
+  Blend(a, b, share_of_b, out);
+  return out;
+}
+
+void BlendFeet(const PostureSample& a, const PostureSample& b, double share_of_b,
+               PostureSample& out) {
   const auto mix = [&](const DVec3& u, const DVec3& v) { return u + share_of_b * (v - u); };
   out.root_m = mix(a.root_m, b.root_m);
-  out.rotations.resize(a.rotations.size());
-  for (std::size_t j = 0; j < a.rotations.size(); ++j) {
-    out.rotations[j] = Blend(a.rotations[j], b.rotations[j], share_of_b);
-  }
   for (std::size_t f = 0; f < 2; ++f) {
     out.ankles[f] = Blend(a.ankles[f], b.ankles[f], share_of_b);
     out.balls_m[f] = mix(a.balls_m[f], b.balls_m[f]);
   }
-  return out;
+}
+
+void Blend(const PostureSample& a, const PostureSample& b, double share_of_b, PostureSample& out) {
+  BlendFeet(a, b, share_of_b, out);
+  out.rotations.resize(a.rotations.size());
+  for (std::size_t j = 0; j < a.rotations.size(); ++j) {
+    out.rotations[j] = Blend(a.rotations[j], b.rotations[j], share_of_b);
+  }
 }
 
 PostureSample SampleOf(const Skeleton& skeleton, ConstPoseSpan pose, double heading_rad) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "runtime/skeleton/leg_rig.h"
@@ -24,11 +25,23 @@ struct PostureSample {
 /// correctly rounded operations, so the result has the same bits on every machine. It does not
 /// depend on the axes of joints: if both rotations are multiplied by a constant rotation, the
 /// result is multiplied by it as well.
-[[nodiscard]] DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b);
+[[nodiscard]] inline DQuat Blend(const DQuat& a, const DQuat& b, double share_of_b) {
+  const double sign = glm::dot(a, b) < 0.0 ? -1.0 : 1.0;
+  const DQuat sum = a * (1.0 - share_of_b) + b * (sign * share_of_b);
+  const double length = std::sqrt(glm::dot(sum, sum));
+  return length > 1e-9 ? sum * (1.0 / length) : a;
+}
 
 /// Returns a + share (b - a) for every member of two samples.
 [[nodiscard]] PostureSample Blend(const PostureSample& a, const PostureSample& b,
                                   double share_of_b);
+
+/// Writes the same to `out`, whose memory it reuses. `out` may be one of the two samples.
+void Blend(const PostureSample& a, const PostureSample& b, double share_of_b, PostureSample& out);
+
+/// Writes only the root and the feet.
+void BlendFeet(const PostureSample& a, const PostureSample& b, double share_of_b,
+               PostureSample& out);
 
 /// Converts a pose with the heading `heading_rad` to a sample, and measures its feet.
 [[nodiscard]] PostureSample SampleOf(const Skeleton& skeleton, ConstPoseSpan pose,

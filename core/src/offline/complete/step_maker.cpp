@@ -3,20 +3,25 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
+#include <ranges>
 #include <utility>
 
+#include "base/check.h"
 #include "base/easing.h"
-#include "base/trig.h"
 #include "offline/base/moving_window.h"
 #include "offline/builtin/leg_ik.h"
-#include "offline/builtin/mirror.h"
 #include "offline/builtin/swing_detour.h"
 #include "offline/extract/extract.h"
+#include "runtime/library/keytimes.h"
 
 namespace stridewire::complete {
 namespace {
 
+// Keytimes are multiples of 1 / kFps.
 constexpr double kFps = 120.0;
+// The reach of the legs is checked about this many times per second.
+constexpr double kReachFps = 60.0;
 
 // Steps that start in a stand begin with a weight shift, which takes time because the body has no
 // momentum. Steps that end in a stand end with settling.
@@ -56,6 +61,12 @@ constexpr double kMaxExtension = 0.996;
 // Part of the step's duration in which the correction of the fixed leg fades in, and out.
 constexpr double kStanceFade = 0.35;
 
+// Most steps do not turn, so these functions avoid trigonometry for the angle 0.
+DVec3 Turned(double yaw_rad, const DVec3& v) { return yaw_rad == 0.0 ? v : RotateYaw(yaw_rad, v); }
+DQuat Turned(double yaw_rad, const DQuat& q) {
+  return yaw_rad == 0.0 ? q : DQuat(YawRotation(yaw_rad)) * q;
+}
+
 std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
 
 // The cubic curve with given positions and velocities at both ends.
@@ -82,9 +93,9 @@ struct HermiteCurve {
   }
 };
 
-// Generates one step. First, it evaluates what the captures and the timing determine, at a series
-// of times (Moment). Then it searches for the detour, the lift and the lowering of the root, which
-// are cheap corrections of these moments.
+// Generates one step. First, it searches for the detour and the lift of the swinging foot and for
+// the lowering of the root. For these it evaluates only feet, hips and root. Then it generates the
+// frames.
 class StepGenerator {
  public:
   StepGenerator(const Person& person, Foot moving, const StepFeet& feet)
@@ -97,55 +108,52 @@ class StepGenerator {
     const double stand_z = person.StandVector(moving).z;
     start_share_ = Share((stand_z - feet.start_m.z) / (stand_z + stride_.start_length_m));
     end_share_ = Share((feet.end_m.z - stand_z) / (stride_.end_length_m - stand_z));
+    outward_ = RotateYaw(0.5 * feet.turn_rad, DVec3(SideSign(moving), 0.0, 0.0));
+    stand_leg_m_ = LegLength(person.skeleton, person.rig, person.stand, fixed_);
     SetTiming();
     PlanRoot();
-    const int frames = static_cast<int>(std::floor(end_s_ * kFps + 0.5)) + 1;
-    moments_.reserve(static_cast<std::size_t>(frames));
-    for (int f = 0; f < frames; ++f) moments_.push_back(MomentAt(f / kFps));
-    StraightenStance();
-    PlanSwing();
+    for (const LegRig::Side& side : person.rig.sides) {
+      for (std::size_t i = 0; i < side.chain.size(); ++i) {
+        if (static_cast<int>(i) >= side.hip && static_cast<int>(i) <= side.ankle) continue;
+        reach_joints_.push_back(static_cast<std::size_t>(side.chain[i]));
+      }
+    }
   }
 
-  RawExample Run(std::span<const ParameterName> names, std::string source) {
-    RawExample example;
-    example.keytimes_s = {0.0, toe_off_s_, strike_s_, end_s_};
-    example.heading_change_rad = feet_.turn_rad;
-    example.source = std::move(source);
-    example.clip.fps = kFps;
-    const auto frames = static_cast<int>(moments_.size());
-    example.clip.Resize(frames, person_.skeleton.joint_count());
-    const std::vector<double> lowered_m = Lowering();
-    const DVec3 origin = moments_.front().root_m;
+  [[nodiscard]] std::vector<double> Keytimes() const {
+    return {0.0, toe_off_s_, strike_s_, end_s_};
+  }
+
+  // Returns a clip with a frame at each of these times, from 0 to the last keytime. If they are in
+  // decreasing order, the clip is the step in reverse. Does not set the frame rate.
+  Clip Run(std::span<const double> times_s) {
+    PlanSwing();
+    PlanLowering();
+    Clip clip;
+    const auto frames = static_cast<int>(times_s.size());
+    clip.Resize(frames, person_.skeleton.joint_count());
+    std::vector<DVec3> roots_m;
+    for (int f = 0; f < frames; ++f) {
+      roots_m.push_back(SetRotations(times_s[static_cast<std::size_t>(f)], clip.frame(f)));
+    }
+    const DVec3 origin(roots_m.front().x, 0.0, roots_m.front().z);
     for (int f = 0; f < frames; ++f) {
       const auto i = static_cast<std::size_t>(f);
-      Pose pose = PoseAt(moments_[i], lowered_m[i]);
-      pose.root_position_m -=
-          Vec3(static_cast<float>(origin.x), 0.0f, static_cast<float>(origin.z));
-      PoseSpan out = example.clip.frame(f);
-      out.root_position_m = pose.root_position_m;
-      std::ranges::copy(pose.rotations, out.rotations.begin());
+      clip.root_positions_m[i] = Vec3(roots_m[i] - origin);
     }
-    MakeSignContinuous(example.clip);
-    MeasureStepParameters(person_.skeleton, names, moving_, example);
-    return example;
+    MakeSignContinuous(clip);
+    return clip;
   }
 
  private:
-  struct Leg {
-    LegPose pose;          // Before inverse kinematics, relative to the root.
-    DQuat ankle_rotation;  // World rotation of the foot in the step.
-    // Position of the ball relative to the fixed ball, before the detour and the lift are added.
-    DVec3 ball_m = DVec3(0.0);
-    DVec3 hip_m = DVec3(0.0);  // Relative to the root.
+  // A foot at some time. Positions are relative to the fixed ball.
+  struct FootState {
+    DQuat ankle_rotation;       // World rotation of the ankle.
+    DVec3 ball_m = DVec3(0.0);  // Before the detour and the lift are added.
+    double swing = 0.0;         // Factor of the detour and the lift.
     DVec3 ankle_to_ball = DVec3(0.0);
     DVec3 ankle_to_tip = DVec3(0.0);
     DVec3 ankle_to_heel = DVec3(0.0);
-  };
-  struct Moment {
-    double generic = 0.0;
-    DVec3 root_m = DVec3(0.0);  // Root before it is lowered so that the legs reach the feet.
-    Pose posture;               // Pose before inverse kinematics, with the root at the origin.
-    std::array<Leg, 2> legs;    // [Foot]
   };
 
   static double Share(double share) { return std::clamp(share, 0.0, kMaxShare); }
@@ -192,35 +200,49 @@ class StepGenerator {
     return share + std::max(0.0, kMinSwingShare - share) * Bump(SwingAt(GenericAt(time_s)));
   }
 
-  [[nodiscard]] Moment MomentAt(double time_s) const {
-    Moment moment;
-    moment.generic = GenericAt(time_s);
-    const PostureSample stride = stride_.At(moment.generic);
-    moment.root_m = RootAt(time_s, stride);
-    moment.posture = PostureAt(time_s, stride);
+  // Sets the rotations of all joints at a time, and returns the root relative to the fixed ball.
+  DVec3 SetRotations(double time_s, PoseSpan pose) {
+    stride_.Sample(GenericAt(time_s), sample_);
+    SetPosture(time_s, pose);
+    DVec3 root = RootAt(time_s);
+    root.y -= LoweredAt(time_s);
+    LegPose leg;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      moment.legs[Index(foot)] = LegAt(foot, time_s, stride, moment.posture);
+      const FootState state = FootAt(foot, time_s);
+      EvaluateLeg(person_.skeleton, person_.rig, pose, foot, leg);
+      SolveLeg(person_.rig, foot, leg, Vec3(TargetOf(state).ankle_m - root),
+               Quat(state.ankle_rotation), pose);
     }
-    return moment;
+    return root;
   }
-  [[nodiscard]] Leg LegAt(Foot foot, double time_s, const PostureSample& stride,
-                          const Pose& posture) const {
+
+  // The following functions expect that `sample_` is the captured stride at `time_s`.
+
+  [[nodiscard]] FootState FootAt(Foot foot, double time_s) const {
+    FootState state;
+    state.ankle_rotation = AnkleRotationAt(foot, time_s);
+    state.ball_m = PlainBallAt(foot, time_s);
+    state.swing = foot == fixed_ ? 0.0 : Bump(SwingAt(GenericAt(time_s)));
+    // Follow the joints from the ankle to the ball.
     const LegRig::Side& side = person_.rig.side(foot);
-    Leg leg;
-    LegPose& pose = leg.pose;
-    EvaluateLeg(person_.skeleton, person_.rig, posture, foot, pose);
-    leg.ankle_rotation = AnkleRotationAt(foot, time_s, stride);
-    leg.ball_m = PlainBallAt(foot, time_s, stride);
-    leg.hip_m = DVec3(pose.positions_m[static_cast<std::size_t>(side.hip)]);
-    const auto ankle = static_cast<std::size_t>(side.ankle);
-    const auto from_ankle = [&](const Vec3& point) {
-      return leg.ankle_rotation * (glm::conjugate(DQuat(pose.world_rotations[ankle])) *
-                                   DVec3(point - pose.positions_m[ankle]));
-    };
-    leg.ankle_to_ball = from_ankle(pose.ball_m);
-    leg.ankle_to_tip = from_ankle(pose.toe_tip_m);
-    leg.ankle_to_heel = leg.ankle_rotation * DVec3(side.heel_m);
-    return leg;
+    const double share = LegShareAt(foot, time_s);
+    DVec3 position(0.0);
+    DQuat rotation = state.ankle_rotation;
+    for (std::size_t i = static_cast<std::size_t>(side.ankle) + 1; i < side.chain.size(); ++i) {
+      const auto j = static_cast<std::size_t>(side.chain[i]);
+      position += rotation * DVec3(person_.skeleton.joints[j].offset_m);
+      rotation = rotation * MixedRotation(j, share);
+    }
+    const ::stridewire::Leg& leg = person_.skeleton.leg(foot);
+    state.ankle_to_ball = position + rotation * DVec3(leg.ball_offset_m);
+    state.ankle_to_tip = position + rotation * DVec3(leg.toe_tip_offset_m);
+    state.ankle_to_heel = state.ankle_rotation * DVec3(side.heel_m);
+    return state;
+  }
+  // Weight of the captured stride for the joints of a leg. The moving leg uses a larger weight of
+  // the captured swing, so that it bends in the plane of the capture.
+  [[nodiscard]] double LegShareAt(Foot foot, double time_s) const {
+    return std::min(1.0, foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s));
   }
 
   void PlanRoot() {
@@ -252,64 +274,54 @@ class StepGenerator {
   }
 
   // Returns the root before it is lowered so that the legs reach the feet.
-  [[nodiscard]] DVec3 RootAt(double time_s, const PostureSample& stride) const {
+  [[nodiscard]] DVec3 RootAt(double time_s) const {
     const double generic = GenericAt(time_s);
     const double share = std::min(1.0, ShareAt(time_s));
     const double captured_s = CapturedTimeAt(generic);
-    DVec3 deviation = share * (stride.root_m - captured_.At(captured_s));
+    DVec3 deviation = share * (sample_.root_m - captured_.At(captured_s));
     const double heading = HeadingAt(time_s);
     // The speed of the pelvis oscillates in proportion to the walking speed.
     const double usual_m_s = share * captured_.VelocityAt(captured_s).z;
-    const double speed_m_s = RotateYaw(-heading, root_.VelocityAt(time_s)).z;
+    const double speed_m_s = Turned(-heading, root_.VelocityAt(time_s)).z;
     if (usual_m_s > 0.0) deviation.z *= std::clamp(speed_m_s / usual_m_s, 0.0, 1.0);
     // The ball of the fixed foot is the origin, and the root is midway between the feet. In
     // strides, momentum carries the body, so the weight shifts less.
     const double to_fixed_m = -0.5 * (feet_.start_m.x + feet_.end_m.x) * 0.5;
     const DVec3 sway(kSwayShare * (1.0 - share) * to_fixed_m * Bump(time_s / end_s_), 0.0, 0.0);
-    return root_.At(time_s) + RotateYaw(heading, deviation + sway);
+    DVec3 root = root_.At(time_s) + Turned(heading, deviation + sway);
+    root.y += StanceRiseAt(time_s, root);
+    return root;
   }
 
-  // Raises or lowers the root in single support until the fixed leg is bent as in a blend of the
-  // stand and the captured stride. Blended heights of the root would bend it further, because a
-  // body falls less than in proportion to the length of the step.
-  void StraightenStance() {
-    const auto f = Index(fixed_);
-    const double stand_m = LegLength(person_.skeleton, person_.rig, person_.stand, fixed_);
+  // Returns by how much the root is raised in single support so that the fixed leg is bent as in a
+  // blend of the stand and the captured stride. Blended heights of the root would bend it further,
+  // because a body falls less than in proportion to the length of the step.
+  [[nodiscard]] double StanceRiseAt(double time_s, const DVec3& root) const {
     const double fade_s = kStanceFade * end_s_;
-    for (std::size_t i = 0; i < moments_.size(); ++i) {
-      Moment& moment = moments_[i];
-      const double time_s = static_cast<double>(i) / kFps;
-      const double share = std::min(1.0, ShareAt(time_s));
-      const double leg_m = stand_m + share * (stride_.LegAt(moment.generic) - stand_m);
-      const DVec3 hip = moment.root_m + moment.legs[f].hip_m;
-      const double change_m =
-          builtin::HighestHipM(hip, TargetAt(fixed_, moment).ankle_m, leg_m) - hip.y;
-      moment.root_m.y += change_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
-    }
+    const double share = std::min(1.0, ShareAt(time_s));
+    const double leg_m = stand_leg_m_ + share * (stride_.LegAt(GenericAt(time_s)) - stand_leg_m_);
+    const DVec3 hip = root + HipAt(fixed_, time_s, RootRotationAt(time_s));
+    const double rise_m =
+        builtin::HighestHipM(hip, TargetOf(FootAt(fixed_, time_s)).ankle_m, leg_m) - hip.y;
+    return rise_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
   }
 
-  [[nodiscard]] DVec3 PlainBallAt(Foot foot, double time_s, const PostureSample& stride) const {
+  [[nodiscard]] DVec3 PlainBallAt(Foot foot, double time_s) const {
     const auto f = Index(foot);
     const double share = foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s);
     const double stand_y = person_.stand.balls_m[f].y;
-    DVec3 ball(0.0, stand_y + share * (stride.balls_m[f].y - stand_y), 0.0);
+    DVec3 ball(0.0, stand_y + share * (sample_.balls_m[f].y - stand_y), 0.0);
     if (foot == fixed_) return ball;
-    const DVec3 end = RotateYaw(feet_.turn_rad, feet_.end_m);
+    const DVec3 end = Turned(feet_.turn_rad, feet_.end_m);
     const DVec3 place =
         feet_.start_m + SmootherStep(SwingAt(GenericAt(time_s))) * (end - feet_.start_m);
     ball.x = place.x;
     ball.z = place.z;
     return ball;
   }
-  [[nodiscard]] DVec3 BallAt(Foot foot, const Moment& moment) const {
-    DVec3 ball = moment.legs[Index(foot)].ball_m;
-    if (foot == fixed_) return ball;
-    const double bump = Bump(SwingAt(moment.generic));
-    const DVec3 outward = RotateYaw(0.5 * feet_.turn_rad, DVec3(SideSign(moving_), 0.0, 0.0));
-    ball.x += detour_m_ * bump * outward.x;
-    ball.z += detour_m_ * bump * outward.z;
-    ball.y += lift_m_ * bump;
-    return ball;
+  // Returns the position of the ball with the detour and the lift.
+  [[nodiscard]] DVec3 BallOf(const FootState& foot) const {
+    return foot.ball_m + foot.swing * (detour_m_ * outward_ + DVec3(0.0, lift_m_, 0.0));
   }
 
   // Yaw of a foot relative to the heading at the start of the step.
@@ -317,43 +329,49 @@ class StepGenerator {
     if (foot == fixed_) return 0.0;
     return feet_.turn_rad * SmootherStep((SwingAt(GenericAt(time_s)) - 0.08) / 0.84);
   }
-  [[nodiscard]] DQuat AnkleRotationAt(Foot foot, double time_s, const PostureSample& stride) const {
+  [[nodiscard]] DQuat AnkleRotationAt(Foot foot, double time_s) const {
     const double share = foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s);
     const auto f = Index(foot);
-    return DQuat(YawRotation(FootYawAt(foot, time_s))) *
-           Blend(person_.stand.ankles[f], stride.ankles[f], std::min(1.0, share));
+    return Turned(FootYawAt(foot, time_s),
+                  Blend(person_.stand.ankles[f], sample_.ankles[f], std::min(1.0, share)));
   }
 
-  // Computes the pose before inverse kinematics, with the root at the origin.
-  [[nodiscard]] Pose PostureAt(double time_s, const PostureSample& stride) const {
+  // Returns the rotation of a joint before inverse kinematics, without turning.
+  [[nodiscard]] DQuat MixedRotation(std::size_t joint, double share) const {
+    return Blend(person_.stand.rotations[joint], sample_.rotations[joint], share);
+  }
+  [[nodiscard]] DQuat RootRotationAt(double time_s) const {
+    return Turned(HeadingAt(time_s), MixedRotation(0, std::min(1.0, ShareAt(time_s))));
+  }
+
+  // Sets the rotations of all joints before inverse kinematics.
+  void SetPosture(double time_s, PoseSpan posture) {
     const double share = std::min(1.0, ShareAt(time_s));
-    PostureSample sample = Blend(person_.stand, stride, share);
-    // The legs use a larger weight of the captured swing, so that they bend in the plane of the
-    // capture.
-    const double leg_share = std::min(1.0, SwingShareAt(time_s));
+    std::vector<DQuat>& mixed = mixed_;
+    mixed.resize(posture.rotations.size());
+    for (std::size_t j = 0; j < mixed.size(); ++j) mixed[j] = MixedRotation(j, share);
+    const double leg_share = LegShareAt(moving_, time_s);
     for (const int joint : person_.rig.side(moving_).chain) {
       const auto j = static_cast<std::size_t>(joint);
-      if (j == 0) continue;
-      sample.rotations[j] = Blend(person_.stand.rotations[j], stride.rotations[j], leg_share);
+      mixed[j] = MixedRotation(j, leg_share);
     }
+    mixed[0] = RootRotationAt(time_s);
     const double heading = HeadingAt(time_s);
-    const DQuat root = DQuat(YawRotation(heading)) * sample.rotations[0];
-    sample.rotations[0] = root;
     // If a foot is turned relative to the body, its leg turns by half the angle.
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const double half = 0.5 * (FootYawAt(foot, time_s) - heading);
+      if (half == 0.0) continue;
       const auto& side = person_.rig.side(foot);
       const auto hip = static_cast<std::size_t>(side.chain[static_cast<std::size_t>(side.hip)]);
       DQuat above(1.0, 0.0, 0.0, 0.0);
       for (int i = 0; i < side.hip; ++i) {
-        above = above *
-                sample.rotations[static_cast<std::size_t>(side.chain[static_cast<std::size_t>(i)])];
+        above = above * mixed[static_cast<std::size_t>(side.chain[static_cast<std::size_t>(i)])];
       }
-      sample.rotations[hip] =
-          glm::conjugate(above) * DQuat(YawRotation(half)) * above * sample.rotations[hip];
+      mixed[hip] = glm::conjugate(above) * DQuat(YawRotation(half)) * above * mixed[hip];
     }
-    sample.root_m = DVec3(0.0);
-    return ToPose(sample);
+    for (std::size_t j = 0; j < mixed.size(); ++j) {
+      posture.rotations[j] = Normalise(Quat(mixed[j]));
+    }
   }
 
   struct LegTarget {
@@ -362,35 +380,34 @@ class StepGenerator {
     DVec3 heel_m = DVec3(0.0);
   };
 
-  [[nodiscard]] LegTarget TargetAt(Foot foot, const Moment& moment) const {
-    const Leg& leg = moment.legs[Index(foot)];
+  [[nodiscard]] LegTarget TargetOf(const FootState& foot) const {
     LegTarget target;
-    target.ankle_m = BallAt(foot, moment) - leg.ankle_to_ball;
-    target.tip_m = target.ankle_m + leg.ankle_to_tip;
-    target.heel_m = target.ankle_m + leg.ankle_to_heel;
+    target.ankle_m = BallOf(foot) - foot.ankle_to_ball;
+    target.tip_m = target.ankle_m + foot.ankle_to_tip;
+    target.heel_m = target.ankle_m + foot.ankle_to_heel;
     return target;
   }
 
-  // Returns the horizontal distance between the swinging and the fixed foot, each of which is a
-  // line from heel to toe tip.
-  [[nodiscard]] double FeetApart(const Moment& moment) const {
-    const LegTarget swinging = TargetAt(moving_, moment);
-    const LegTarget still = TargetAt(fixed_, moment);
+  // Returns the horizontal distance between two feet, each of which is a line from heel to toe tip.
+  [[nodiscard]] double Distance(const FootState& one, const FootState& other) const {
+    const LegTarget from = TargetOf(one);
+    const LegTarget to = TargetOf(other);
     double nearest = kDetours.max_m;
     for (int i = 0; i <= 4; ++i) {
       for (int k = 0; k <= 4; ++k) {
-        const DVec3 a = swinging.heel_m + 0.25 * i * (swinging.tip_m - swinging.heel_m);
-        const DVec3 b = still.heel_m + 0.25 * k * (still.tip_m - still.heel_m);
+        const DVec3 a = from.heel_m + 0.25 * i * (from.tip_m - from.heel_m);
+        const DVec3 b = to.heel_m + 0.25 * k * (to.tip_m - to.heel_m);
         nearest = std::min(nearest, std::hypot(a.x - b.x, a.z - b.z));
       }
     }
     return nearest;
   }
 
-  // Returns the moment nearest to a fraction of the swing, 0 to 1.
-  [[nodiscard]] const Moment& MomentOfSwing(double part) const {
-    const double time_s = toe_off_s_ + part * (strike_s_ - toe_off_s_);
-    return moments_[static_cast<std::size_t>(std::floor(time_s * kFps + 0.5))];
+  // Returns a foot near a fraction of the swing, 0 to 1.
+  FootState FootInSwing(Foot foot, double part) {
+    const double time_s = ToFrames(toe_off_s_ + part * (strike_s_ - toe_off_s_));
+    stride_.Sample(GenericAt(time_s), reach_joints_, sample_);
+    return FootAt(foot, time_s);
   }
 
   // If the step turns, leads the swinging foot around the fixed one. Raises it until it clears the
@@ -400,7 +417,7 @@ class StepGenerator {
     const LegRig::Side& side = person_.rig.side(moving_);
     const double ball_y = person_.stand.balls_m[Index(moving_)].y;
     struct Check {
-      const Moment* moment;
+      FootState foot;
       double ball_m;  // Minimum height of the ball.
       double tip_m;   // Minimum height of the toe tip.
     };
@@ -408,32 +425,52 @@ class StepGenerator {
     for (int i = 4; i <= 17; ++i) {
       const double part = 0.05 * i;
       const bool is_early = part < 0.3;
-      checks.push_back({&MomentOfSwing(part), ball_y + (is_early ? 0.0 : kClearanceM),
+      checks.push_back({FootInSwing(moving_, part), ball_y + (is_early ? 0.0 : kClearanceM),
                         side.toe_height_m + (is_early ? 0.0 : kTipClearanceM)});
     }
     const auto is_clear = [&](const Check& check) {
-      return BallAt(moving_, *check.moment).y >= check.ball_m &&
-             TargetAt(moving_, *check.moment).tip_m.y >= check.tip_m;
+      return BallOf(check.foot).y >= check.ball_m && TargetOf(check.foot).tip_m.y >= check.tip_m;
     };
     while (!std::ranges::all_of(checks, is_clear) && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
   }
 
   void PlanDetour() {
+    std::vector<std::pair<FootState, FootState>> feet;
+    for (int i = 1; i < 10; ++i) {
+      feet.emplace_back(FootInSwing(moving_, 0.1 * i), FootInSwing(fixed_, 0.1 * i));
+    }
     detour_m_ = builtin::FindDetour(kDetours, [&](double detour_m) {
       detour_m_ = detour_m;
       double nearest = kDetours.max_m;
-      for (int i = 1; i < 10; ++i) nearest = std::min(nearest, FeetApart(MomentOfSwing(0.1 * i)));
+      for (const auto& [swinging, still] : feet) {
+        nearest = std::min(nearest, Distance(swinging, still));
+      }
       return nearest;
     });
   }
 
+  // Returns the position of a hip relative to the root, whose rotation is `rotation`.
+  [[nodiscard]] DVec3 HipAt(Foot foot, double time_s, DQuat rotation) const {
+    const LegRig::Side& side = person_.rig.side(foot);
+    const double leg_share = LegShareAt(foot, time_s);
+    DVec3 position(0.0);
+    for (int i = 1; i <= side.hip; ++i) {
+      const auto j = static_cast<std::size_t>(side.chain[static_cast<std::size_t>(i)]);
+      position += rotation * DVec3(person_.skeleton.joints[j].offset_m);
+      if (i < side.hip) rotation = rotation * MixedRotation(j, leg_share);
+    }
+    return position;
+  }
+
   // Returns by how much the root must be lowered for the legs to reach the feet.
-  [[nodiscard]] double MissingReach(const Moment& moment) const {
+  [[nodiscard]] double MissingReachAt(double time_s) const {
     double missing = 0.0;
+    const DVec3 root = RootAt(time_s);
+    const DQuat root_rotation = RootRotationAt(time_s);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      const DVec3 hip = moment.root_m + moment.legs[Index(foot)].hip_m;
+      const DVec3 hip = root + HipAt(foot, time_s, root_rotation);
       const double highest_m =
-          builtin::HighestHipM(hip, TargetAt(foot, moment).ankle_m, reach_m_[Index(foot)]);
+          builtin::HighestHipM(hip, TargetOf(FootAt(foot, time_s)).ankle_m, reach_m_[Index(foot)]);
       missing = std::max(missing, hip.y - highest_m);
     }
     return missing;
@@ -450,50 +487,48 @@ class StepGenerator {
     return std::max(kMaxExtension, standing) * (side.thigh_m + side.shank_m);
   }
 
-  // Returns how far the root is lowered at each moment so that the legs reach the feet. At both
-  // ends, the lowering depends only on the pose at that end, so that successive steps fit together.
-  [[nodiscard]] std::vector<double> Lowering() const {
+  // Plans how far the root is lowered so that the legs reach the feet. At both ends, the lowering
+  // depends only on the pose at that end, so that successive steps fit together.
+  void PlanLowering() {
     constexpr int kRounds = 3;
-    constexpr int kHalf = 10;
-    constexpr double kFramesFromEnds = 8.0;
-    std::vector<double> weights;
-    for (int k = -kHalf; k <= kHalf; ++k) weights.push_back(1.0 - std::fabs(k) / (kHalf + 1.0));
-    const std::size_t count = moments_.size();
-    std::vector<double> reach_missing;
-    reach_missing.reserve(count);
-    for (const Moment& moment : moments_) reach_missing.push_back(MissingReach(moment));
+    constexpr int kHalf = 4;  // Half the width of the window of the moving maximum, in samples.
+    constexpr double kSamplesFromEnds = 4.0;
+    const auto intervals = static_cast<std::size_t>(std::ceil(end_s_ * kReachFps));
+    const std::size_t count = intervals + 1;
+    std::vector<double> reach_missing(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double time_s = end_s_ * static_cast<double>(i) / static_cast<double>(intervals);
+      stride_.Sample(GenericAt(time_s), reach_joints_, sample_);
+      reach_missing[i] = MissingReachAt(time_s);
+    }
     const double first = reach_missing.front();
     const double last = reach_missing.back();
-    std::vector<double> lowered(count, 0.0);
+    lowered_m_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
-      const double part = static_cast<double>(i) / static_cast<double>(count - 1);
-      lowered[i] = first + (last - first) * SmootherStep(part);
+      const double part = static_cast<double>(i) / static_cast<double>(intervals);
+      lowered_m_[i] = first + (last - first) * SmootherStep(part);
     }
+    std::vector<double> weights;
+    for (int k = -kHalf; k <= kHalf; ++k) weights.push_back(1.0 - std::fabs(k) / (kHalf + 1.0));
     std::vector<double> missing(count);
     for (int round = 0; round < kRounds; ++round) {
       for (std::size_t i = 0; i < count; ++i) {
-        missing[i] = std::max(0.0, reach_missing[i] - lowered[i]);
+        missing[i] = std::max(0.0, reach_missing[i] - lowered_m_[i]);
       }
+      if (*std::ranges::max_element(missing) == 0.0) break;
       const std::vector<double> smooth = MovingMean(MovingMaximum(missing, kHalf), weights);
       for (std::size_t i = 0; i < count; ++i) {
-        const auto to_end = static_cast<double>(std::min(i, count - 1 - i));
-        lowered[i] += smooth[i] * SmoothStep(to_end / kFramesFromEnds);
+        const auto to_end = static_cast<double>(std::min(i, intervals - i));
+        lowered_m_[i] += smooth[i] * SmoothStep(to_end / kSamplesFromEnds);
       }
     }
-    return lowered;
   }
 
-  [[nodiscard]] Pose PoseAt(const Moment& moment, double lowered_m) const {
-    Pose pose = moment.posture;
-    DVec3 root = moment.root_m;
-    root.y -= lowered_m;
-    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      const Leg& leg = moment.legs[Index(foot)];
-      SolveLeg(person_.rig, foot, leg.pose, Vec3(TargetAt(foot, moment).ankle_m - root),
-               Quat(leg.ankle_rotation), pose);
-    }
-    pose.root_position_m = Vec3(root);
-    return pose;
+  [[nodiscard]] double LoweredAt(double time_s) const {
+    const double at = time_s / end_s_ * static_cast<double>(lowered_m_.size() - 1);
+    const auto i = std::min(static_cast<std::size_t>(at), lowered_m_.size() - 2);
+    const double part = at - static_cast<double>(i);
+    return lowered_m_[i] + part * (lowered_m_[i + 1] - lowered_m_[i]);
   }
 
   const Person& person_;
@@ -506,13 +541,46 @@ class StepGenerator {
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;
   double end_s_ = 0.0;
+  double stand_leg_m_ = 0.0;         // Distance from hip to ankle of the fixed leg in the stand.
   std::array<double, 2> reach_m_{};  // [Foot]: largest distance from hip to ankle.
   HermiteCurve captured_;            // Curve with the start and end of the captured root.
   HermiteCurve root_;                // Curve with the start and end of the generated root.
-  std::vector<Moment> moments_;      // [frame]
+  DVec3 outward_ = DVec3(0.0);       // Direction of a detour, away from the fixed foot.
+  std::vector<double> lowered_m_;    // Lowering of the root, evenly sampled from 0 to end_s_.
   double detour_m_ = 0.0;
   double lift_m_ = 0.0;
+  PostureSample sample_;      // The captured stride at the current time.
+  std::vector<DQuat> mixed_;  // Scratch memory of SetPosture.
+  // Joints on which hips and feet depend, except for those which inverse kinematics sets.
+  std::vector<std::size_t> reach_joints_;
 };
+
+// Returns the time of each grid point.
+std::vector<double> GridTimes(std::span<const double> keytimes_s, std::span<const int> cells) {
+  const TimeWarp warp(keytimes_s, cells);
+  const int points = 1 + std::accumulate(cells.begin(), cells.end(), 0);
+  std::vector<double> times_s;
+  times_s.reserve(static_cast<std::size_t>(points));
+  for (int p = 0; p < points; ++p) times_s.push_back(warp.TimeAt(p));
+  return times_s;
+}
+
+// Returns the generator of a step forward. A step backward is this step in reverse.
+StepGenerator ForwardGenerator(const Person& person, const StepSpec& step) {
+  if (!step.is_backward) return {person, step.moving, step.feet};
+  STRIDEWIRE_CHECK(step.feet.turn_rad == 0.0);
+  return {person, step.moving, {step.feet.end_m, step.feet.start_m, 0.0}};
+}
+
+std::vector<double> KeytimesOf(const StepSpec& step, const StepGenerator& forward) {
+  const std::vector<double> keys = forward.Keytimes();
+  if (!step.is_backward) return keys;
+  std::vector<double> reversed;
+  for (const double key : std::views::reverse(keys)) {
+    reversed.push_back(kBackwardSlowdown * (keys.back() - key));
+  }
+  return reversed;
+}
 
 }  // namespace
 
@@ -520,18 +588,28 @@ DVec3 Person::StandVector(Foot moving) const {
   return stand.balls_m[Index(moving)] - stand.balls_m[Index(OtherFoot(moving))];
 }
 
-RawExample MakeStep(const Person& person, Foot moving, const StepFeet& feet,
-                    std::span<const ParameterName> names, std::string source) {
-  return StepGenerator(person, moving, feet).Run(names, std::move(source));
+std::vector<double> StepKeytimes(const Person& person, const StepSpec& step) {
+  return KeytimesOf(step, ForwardGenerator(person, step));
 }
 
-RawExample MakeBackwardStep(const Person& person, Foot moving, const StepFeet& feet,
-                            std::span<const ParameterName> names, std::string source) {
-  const StepFeet reversed = {feet.end_m, feet.start_m, 0.0};
-  RawExample step = builtin::Reversed(MakeStep(person, moving, reversed, names, std::move(source)),
-                                      kBackwardSlowdown);
-  MeasureStepParameters(person.skeleton, names, moving, step);
-  return step;
+RawExample MakeStep(const Person& person, const StepSpec& step, std::span<const int> cells,
+                    std::span<const ParameterName> names, std::string source) {
+  StepGenerator forward = ForwardGenerator(person, step);
+  RawExample example;
+  example.keytimes_s = KeytimesOf(step, forward);
+  example.heading_change_rad = step.feet.turn_rad;
+  example.source = std::move(source);
+  example.frame_times_s = GridTimes(example.keytimes_s, cells);
+  std::vector<double> times_s = example.frame_times_s;
+  if (step.is_backward) {
+    for (double& time_s : times_s) {
+      time_s = (example.keytimes_s.back() - time_s) / kBackwardSlowdown;
+    }
+  }
+  example.clip = forward.Run(times_s);
+  example.clip.fps = static_cast<double>(times_s.size() - 1) / example.keytimes_s.back();
+  MeasureStepParameters(person.skeleton, names, step.moving, example);
+  return example;
 }
 
 }  // namespace stridewire::complete

@@ -30,6 +30,13 @@ struct StepFeet {
   double turn_rad = 0.0;  ///< Positive is left.
 };
 
+/// A step to generate.
+struct StepSpec {
+  Foot moving = Foot::kLeft;
+  StepFeet feet;
+  bool is_backward = false;
+};
+
 /// Generates a step on level ground. Its posture at generic time g(t) is a blend of the stand pose
 /// and the mean captured stride:
 ///
@@ -42,13 +49,17 @@ struct StepFeet {
 /// The feet are placed first. The root then follows a cubic curve, plus w times the deviation of
 /// the captured root from such a curve. Finally, inverse kinematics places the legs.
 ///
-/// `names` selects the parameters of the example, which are measured in its first and last pose.
-[[nodiscard]] RawExample MakeStep(const Person& person, Foot moving, const StepFeet& feet,
-                                  std::span<const ParameterName> names, std::string source);
+/// A step backward is a forward step from `feet.end_m` to `feet.start_m`, played in reverse. Its
+/// moving foot is in front in `feet.start_m` and behind in `feet.end_m`, and it does not turn.
+///
+/// `cells` [interval] is the grid of the step's group (CellsAtRate). The example has a frame at
+/// each grid point, so that LibraryBuilder stores the frames without interpolation. `names` selects
+/// the parameters of the example, which are measured in its first and last pose.
+[[nodiscard]] RawExample MakeStep(const Person& person, const StepSpec& step,
+                                  std::span<const int> cells, std::span<const ParameterName> names,
+                                  std::string source);
 
-/// Generates a step backward: a forward step from `feet.end_m` to `feet.start_m`, played in
-/// reverse. The moving foot is in front in `feet.start_m` and behind in `feet.end_m`.
-[[nodiscard]] RawExample MakeBackwardStep(const Person& person, Foot moving, const StepFeet& feet,
-                                          std::span<const ParameterName> names, std::string source);
+/// Returns the keytimes of the example that MakeStep generates.
+[[nodiscard]] std::vector<double> StepKeytimes(const Person& person, const StepSpec& step);
 
 }  // namespace stridewire::complete

@@ -154,7 +154,11 @@ StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides
       origin.y = 0.0;
       sample.root_m -= origin;
       for (DVec3& ball : sample.balls_m) ball -= origin;
-      model.points[p] = count == 1.0 ? sample : Blend(model.points[p], sample, 1.0 / count);
+      if (count == 1.0) {
+        model.points[p] = std::move(sample);
+      } else {
+        Blend(model.points[p], sample, 1.0 / count, model.points[p]);
+      }
     }
     for (std::size_t k = 0; k < model.keytimes_s.size(); ++k) {
       model.keytimes_s[k] += example.keytimes_s[k];
@@ -210,8 +214,26 @@ double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point) {
 }
 
 PostureSample StrideModel::At(double generic_time) const {
+  PostureSample sample;
+  Sample(generic_time, sample);
+  return sample;
+}
+
+void StrideModel::Sample(double generic_time, PostureSample& out) const {
   const auto [k, share] = PointAt(generic_time);
-  return Blend(points[k], points[k + 1], share);
+  Blend(points[k], points[k + 1], share, out);
+}
+
+void StrideModel::Sample(double generic_time, std::span<const std::size_t> joints,
+                         PostureSample& out) const {
+  const auto [k, share] = PointAt(generic_time);
+  const PostureSample& a = points[k];
+  const PostureSample& b = points[k + 1];
+  BlendFeet(a, b, share, out);
+  out.rotations.resize(a.rotations.size());
+  for (const std::size_t j : joints) {
+    out.rotations[j] = Blend(a.rotations[j], b.rotations[j], share);
+  }
 }
 
 double StrideModel::LegAt(double generic_time) const {

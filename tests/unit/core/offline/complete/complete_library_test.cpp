@@ -36,8 +36,11 @@ RawLibrary WalkWithoutStop() {
   return assembler.Assemble().value();
 }
 
-RawLibrary Completed(RawLibrary library) {
-  const Completion completion = CompleteLibrary(library);
+// A rate at which the frames of generated steps are dense.
+constexpr double kDenseFps = 120.0;
+
+RawLibrary Completed(RawLibrary library, double grid_fps = LibraryBuilder().grid_fps) {
+  const Completion completion = CompleteLibrary(library, grid_fps);
   EXPECT_EQ(completion.failure, "");
   EXPECT_GT(completion.example_count, 0);
   return library;
@@ -113,7 +116,9 @@ TEST(CompleteLibrary, StepsAreWellFormed) {
       SCOPED_TRACE(example.source);
       EXPECT_TRUE(example.clip.Validate().has_value());
       EXPECT_TRUE(ValidateKeytimes(example.keytimes_s).has_value());
-      EXPECT_NEAR(example.keytimes_s.back(), example.clip.duration_s(), 1e-9);
+      ASSERT_EQ(std::ssize(example.frame_times_s), example.clip.frame_count());
+      EXPECT_EQ(example.frame_times_s.front(), 0.0);
+      EXPECT_EQ(example.frame_times_s.back(), example.keytimes_s.back());
       const DVec3 end =
           FootVector(library.skeleton, example.clip.frame(example.clip.frame_count() - 1), moving,
                      example.heading_change_rad);
@@ -132,13 +137,36 @@ TEST(CompleteLibrary, StepsAreWellFormed) {
 
 // From frame to frame, no joint rotates faster than 12 rad/s, as in motions of people.
 TEST(CompleteLibrary, StepsAreSmooth) {
-  const RawLibrary library = Completed(WalkWithoutStop());
+  const RawLibrary library = Completed(WalkWithoutStop(), kDenseFps);
   for (const RawGroup* group : CompletedGroups(library)) {
     for (const RawExample& example : group->examples) {
-      const double limit_rad = 12.0 / example.clip.fps;
+      const std::vector<double>& times_s = example.frame_times_s;
       for (int f = 1; f < example.clip.frame_count(); ++f) {
-        ASSERT_LT(LargestJointAngle(example.clip.frame(f - 1), example.clip.frame(f)), limit_rad)
+        const auto i = static_cast<std::size_t>(f);
+        ASSERT_LT(LargestJointAngle(example.clip.frame(f - 1), example.clip.frame(f)),
+                  12.0 * (times_s[i] - times_s[i - 1]))
             << example.source << ", frame " << f;
+      }
+    }
+  }
+}
+
+// LibraryBuilder stores the frames of generated steps without interpolation.
+TEST(CompleteLibrary, FramesAreGridPoints) {
+  const RawLibrary raw = Completed(WalkWithoutStop());
+  const auto library = LibraryBuilder::Selecting().Build(raw).value();
+  const GridLayout& layout = library->layout();
+  for (std::size_t g = 0; g < raw.groups.size(); ++g) {
+    if (!raw.groups[g].is_completed) continue;
+    const MotionGroup& group = library->groups()[g];
+    for (int e = 0; e < group.example_count; ++e) {
+      const Clip& clip = raw.groups[g].examples[static_cast<std::size_t>(e)].clip;
+      ASSERT_EQ(group.grid_point_count, clip.frame_count());
+      for (int p = 0; p < group.grid_point_count; ++p) {
+        const auto row = static_cast<std::size_t>(p * group.example_count + e);
+        const auto floats = static_cast<std::size_t>(layout.row_floats);
+        const Vec3 stored(layout.RootOf(&group.grid[row * floats]).position_m);
+        ASSERT_EQ(stored, clip.frame(p).root_position_m);
       }
     }
   }
@@ -214,7 +242,7 @@ TEST(CompleteLibrary, StopsEndInTheStandPose) {
 
 // A stride of one foot ends in the pose in which a stride of the other foot starts.
 TEST(CompleteLibrary, StridesContinueEachOther) {
-  const RawLibrary library = Completed(WalkWithoutStop());
+  const RawLibrary library = Completed(WalkWithoutStop(), kDenseFps);
   // Returns the longest step of a foot, among straight steps.
   const auto longest = [&](Foot foot) {
     const RawExample* best = nullptr;
@@ -239,8 +267,9 @@ TEST(CompleteLibrary, StridesContinueEachOther) {
     EXPECT_NEAR(end.root_position_m.y, start.root_position_m.y, 0.01);
     const Vec3 end_step =
         end.root_position_m - before->clip.frame(before->clip.frame_count() - 2).root_position_m;
+    const double end_step_s = before->frame_times_s.back() - before->frame_times_s.rbegin()[1];
     const Vec3 start_step = after->clip.frame(1).root_position_m - start.root_position_m;
-    EXPECT_NEAR(end_step.z * before->clip.fps, start_step.z * after->clip.fps, 0.2);
+    EXPECT_NEAR(end_step.z / end_step_s, start_step.z / after->frame_times_s[1], 0.2);
   }
 }
 
@@ -282,7 +311,7 @@ TEST(CompleteLibrary, DoesNotDependOnTheAxesOfJoints) {
       const Clip& one = completed.groups[g].examples[e].clip;
       const Clip& other = reframed.groups[g].examples[e].clip;
       ASSERT_EQ(one.frame_count(), other.frame_count());
-      for (int f = 0; f < one.frame_count(); f += 10) {
+      for (int f = 0; f < one.frame_count(); f += 3) {
         ForwardKinematics(completed.skeleton, one.frame(f), positions[0], rotations);
         ForwardKinematics(reframed.skeleton, other.frame(f), positions[1], rotations);
         for (std::size_t j = 0; j < positions[0].size(); ++j) {
@@ -384,7 +413,8 @@ TEST_P(CompleteCaptures, EveryTakePassesTheSelfCheck) {
 TEST_P(CompleteCaptures, GeneratedStepsAreStoredAccurately) {
   const std::vector<std::string> subjects = {GetParam()};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
-  const RawLibrary library = Completed(AssembleTakes(TakesOf(subjects), {.mirror = true}));
+  const RawLibrary library =
+      Completed(AssembleTakes(TakesOf(subjects), {.mirror = true}), kDenseFps);
   const GridLayout layout(library.skeleton.joint_count());
   const Quat& stand_root = library.stand_pose.rotations[0];
   const double fps = LibraryBuilder{}.grid_fps;
