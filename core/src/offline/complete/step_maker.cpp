@@ -295,7 +295,8 @@ class StepGenerator {
 
   // Returns by how much the root is raised in single support so that the fixed leg is bent as in a
   // blend of the stand and the captured stride. Blended heights of the root would bend it further,
-  // because a body falls less than in proportion to the length of the step.
+  // because a body falls less than in proportion to the length of the step. Starts and stops keep
+  // the blended heights, because a rise would make the pelvis accelerate more.
   [[nodiscard]] double StanceRiseAt(double time_s, const DVec3& root) const {
     const double fade_s = kStanceFade * end_s_;
     const double share = std::min(1.0, ShareAt(time_s));
@@ -303,7 +304,8 @@ class StepGenerator {
     const DVec3 hip = root + HipAt(fixed_, time_s, RootRotationAt(time_s));
     const double rise_m =
         builtin::HighestHipM(hip, TargetOf(FootAt(fixed_, time_s)).ankle_m, leg_m) - hip.y;
-    return rise_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
+    const double in_stride = std::min(1.0, 2.0 * std::min(start_share_, end_share_));
+    return in_stride * rise_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
   }
 
   [[nodiscard]] DVec3 PlainBallAt(Foot foot, double time_s) const {
