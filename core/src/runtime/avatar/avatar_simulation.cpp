@@ -485,7 +485,9 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
                scratch.correction.weights(next), body_.movement);
   }
   body_.StartWeighted(base_, 1.0);
-  double rate = std::clamp(body_.movement.duration_s() / plan.brisk_s, 1.0, plan.max_rate);
+  const double captured_s = body_.movement.duration_s();
+  double rate =
+      captured_s > plan.slow_s ? std::clamp(captured_s / plan.brisk_s, 1.0, plan.max_rate) : 1.0;
   if (variation) rate *= variation->RateFactor();
   if (rate != 1.0) body_.StartWeighted(base_, rate);
   if (start_phase > 0.0) {

@@ -51,10 +51,11 @@ struct RequestPlan {
   double max_extra_turn_rad = kMaxExtraTurnRad;
   bool is_side_given = false;  ///< Steps: true if the request specified the side.
   bool is_varied = true;       ///< Steps: true if the step may be varied (see StrideVariation).
-  /// Maximum playback speed. The movement is played only as fast as is necessary to shorten it to
-  /// `brisk_s`.
+  /// Maximum playback speed. If the movement takes longer than `slow_s`, it is played as fast as is
+  /// necessary to shorten it to `brisk_s`.
   double max_rate = 1.0;
   double brisk_s = kQuickStepS;
+  double slow_s = kQuickStepS;
   /// True if `applied` differs from `requested` by more than 1e-6.
   bool clamped = false;
   /// Distance between `applied` and `requested` in metres. A radian counts as 0.5 m.

@@ -48,8 +48,10 @@ constexpr double kForwardM = 0.2;
 constexpr double kStrideM = 0.35;
 constexpr double kHurriedTurnRad = 0.25;
 constexpr double kUnhurriedClimbM = 0.08;
-// Without a requested speed, other steps that take longer than kBriskStrideS are played faster, at
-// most by the factor kBriskRate. People who walk to a goal take 100 to 110 steps per minute.
+// Without a requested speed, other steps that take longer than kSlowStrideS are played faster, so
+// that they take kBriskStrideS, at most by the factor kBriskRate. People who walk to a goal take 100
+// to 110 steps per minute.
+constexpr double kSlowStrideS = 0.68;
 constexpr double kBriskStrideS = 0.6;
 constexpr double kBriskRate = 1.4;
 
@@ -676,6 +678,7 @@ WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
     if (!walk.speed_m_s && step->plan.max_rate == 1.0 && std::fabs(climb_m) <= kUnhurriedClimbM) {
       step->plan.max_rate = kBriskRate;
       step->plan.brisk_s = kBriskStrideS;
+      step->plan.slow_s = kSlowStrideS;
     }
     progress.is_aimed[static_cast<std::size_t>(step->moved)] = step->is_last;
     return {.outcome = WalkOutcome::kStep, .plan = step->plan};
