@@ -277,9 +277,9 @@ TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
 }
 
 // All machines produce this hash (decision 0002). If a formula for poses changes intentionally, the
-// hash changes, and the protocol needs a new version. Otherwise clients that evaluate movements with
-// the old formulas would display other poses than the server (decision 0021). Replicas receive the
-// decisions of avatars, such as the speed of a step, so another decision changes the hash only.
+// hash changes, and the protocol needs a new version. Otherwise clients that evaluate movements
+// with the old formulas would display other poses than the server (decision 0021). Replicas receive
+// the decisions of avatars, such as the speed of a step, so another decision changes the hash only.
 TEST(Evaluation, MatchesTheProtocolVersion) {
   DrawnCrowd crowd(LibraryOf({}), 24, 10, {.idle_motion = false});
   std::string bytes;

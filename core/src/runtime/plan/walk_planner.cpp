@@ -49,8 +49,8 @@ constexpr double kStrideM = 0.35;
 constexpr double kHurriedTurnRad = 0.25;
 constexpr double kUnhurriedClimbM = 0.08;
 // Without a requested speed, other steps that take longer than kSlowStrideS are played faster, so
-// that they take kBriskStrideS, at most by the factor kBriskRate. People who walk to a goal take 100
-// to 110 steps per minute.
+// that they take kBriskStrideS, at most by the factor kBriskRate. People who walk to a goal take
+// 100 to 110 steps per minute.
 constexpr double kSlowStrideS = 0.68;
 constexpr double kBriskStrideS = 0.6;
 constexpr double kBriskRate = 1.4;
