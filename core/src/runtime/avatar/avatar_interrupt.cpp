@@ -143,7 +143,7 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(d
       redirection = PlanEarlyLanding(phase);
     }
   }
-  if (redirection) redirection->plan.max_rate = kHurriedRate;
+  if (redirection) redirection->plan.pace.max_rate = kHurriedRate;
   return redirection;
 }
 

@@ -254,7 +254,7 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
     is_walking_ = false;
     SwitchPlanting();
     if (auto plan = PlanClosingStep()) {
-      if (is_hurried) plan->max_rate = kHurriedRate;
+      if (is_hurried) plan->pace.max_rate = kHurriedRate;
       EndIdleMotion();  // The avatar may have started to idle while the next request was delayed.
       StartInserted(*plan, scratch);
       return true;
@@ -302,7 +302,7 @@ void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch
       FindTransitionPath(*body_.library, request, direct,
                          {feet_, last_moved_, last_group_, inserted_steps_, landing_conditions()});
   if (path.is_inserted) {
-    if (is_hurried) path.plan->max_rate = kHurriedRate;
+    if (is_hurried) path.plan->pace.max_rate = kHurriedRate;
     StartInserted(*path.plan, scratch);
     interrupts_ = is_hurried && std::holds_alternative<JumpRequest>(request.movement);
   } else if (path.plan) {
@@ -485,9 +485,7 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double start_phase,
                scratch.correction.weights(next), body_.movement);
   }
   body_.StartWeighted(base_, 1.0);
-  const double captured_s = body_.movement.duration_s();
-  double rate =
-      captured_s > plan.slow_s ? std::clamp(captured_s / plan.brisk_s, 1.0, plan.max_rate) : 1.0;
+  double rate = plan.pace.RateOf(body_.movement.duration_s());
   if (variation) rate *= variation->RateFactor();
   if (rate != 1.0) body_.StartWeighted(base_, rate);
   if (start_phase > 0.0) {

@@ -161,14 +161,14 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
     }
   }
 
-  // If the group lacks the parameter of a requested value, the error is the whole value.
+  // If the group lacks the parameter of a requested value, its steps have the neutral value.
   double missed_m = 0.0;
   for (const ParameterName name :
        {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
     const auto i = static_cast<std::size_t>(name);
     if (!goals[i].given || is_spanned[i]) continue;
-    const double prefers_stand_pose = name == ParameterName::kEndX ? stand_side_m : 0.0;
-    const double missed = goals[i].weight * std::fabs(goals[i].value - prefers_stand_pose);
+    const double neutral = name == ParameterName::kEndX ? stand_side_m : 0.0;
+    const double missed = goals[i].weight * std::fabs(goals[i].value - neutral);
     if (missed > kChangeM) plan.clamped = true;
     missed_m += missed;
   }
@@ -176,10 +176,10 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   for (const ParameterName name : {ParameterName::kStartX, ParameterName::kStartY}) {
     const auto i = static_cast<std::size_t>(name);
     if (!goals[i].given || is_spanned[i]) continue;
-    const double prefers_stand_pose = name == ParameterName::kStartX ? stand_side_m : 0.0;
+    const double neutral = name == ParameterName::kStartX ? stand_side_m : 0.0;
     start_error_m +=
         goals[i].weight *
-        std::max(0.0, std::fabs(goals[i].value - prefers_stand_pose) -
+        std::max(0.0, std::fabs(goals[i].value - neutral) -
                           (name == ParameterName::kStartX ? kStartSlackM : kLevelSlackM));
   }
 

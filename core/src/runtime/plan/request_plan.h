@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 
@@ -33,6 +34,18 @@ struct RequestTarget {
 inline constexpr double kQuickStepS = 0.5;
 inline constexpr double kHurriedRate = 1.6;
 
+/// How fast movements are played that would take long.
+struct PlaybackPace {
+  double max_rate = 1.0;             ///< Maximum playback speed; 1 is that of the examples.
+  double long_s = kQuickStepS;       ///< Movements up to this duration are not played faster.
+  double shortened_s = kQuickStepS;  ///< Duration of longer ones, if `max_rate` allows it.
+
+  /// Returns the playback speed of a movement whose examples take `duration_s`.
+  [[nodiscard]] double RateOf(double duration_s) const {
+    return duration_s > long_s ? std::clamp(duration_s / shortened_s, 1.0, max_rate) : 1.0;
+  }
+};
+
 /// A request expressed as a group of the library and parameters of that group.
 struct RequestPlan {
   int group = -1;
@@ -51,11 +64,7 @@ struct RequestPlan {
   double max_extra_turn_rad = kMaxExtraTurnRad;
   bool is_side_given = false;  ///< Steps: true if the request specified the side.
   bool is_varied = true;       ///< Steps: true if the step may be varied (see StrideVariation).
-  /// Maximum playback speed. If the movement takes longer than `slow_s`, it is played as fast as is
-  /// necessary to shorten it to `brisk_s`.
-  double max_rate = 1.0;
-  double brisk_s = kQuickStepS;
-  double slow_s = kQuickStepS;
+  PlaybackPace pace;
   /// True if `applied` differs from `requested` by more than 1e-6.
   bool clamped = false;
   /// Distance between `applied` and `requested` in metres. A radian counts as 0.5 m.

@@ -48,12 +48,9 @@ constexpr double kForwardM = 0.2;
 constexpr double kStrideM = 0.35;
 constexpr double kHurriedTurnRad = 0.25;
 constexpr double kUnhurriedClimbM = 0.08;
-// Without a requested speed, other steps that take longer than kSlowStrideS are played faster, so
-// that they take kBriskStrideS, at most by the factor kBriskRate. People who walk to a goal take
-// 100 to 110 steps per minute.
-constexpr double kSlowStrideS = 0.68;
-constexpr double kBriskStrideS = 0.6;
-constexpr double kBriskRate = 1.4;
+// The pace of other steps if no speed was requested. People who walk to a goal take 100 to 110
+// steps per minute.
+constexpr PlaybackPace kBriskPace{.max_rate = 1.4, .long_s = 0.68, .shortened_s = 0.6};
 
 // Limits on the ground below a sole (FootSupport). They exclude edges, bumps and walls.
 constexpr double kLeastCarried = 0.999;
@@ -423,7 +420,7 @@ class StepPlanner {
         print.position_m.y - stance_.feet[static_cast<std::size_t>(moving_)].position_m.y;
     if (std::fabs(climb_m) <= kUnhurriedClimbM &&
         (wanted.z < kStrideM || std::fabs(wanted_rad) > kHurriedTurnRad)) {
-      plan->max_rate = kHurriedRate;
+      plan->pace.max_rate = kHurriedRate;
     }
     plan->most_residual_m = reach * kMaxPlantedErrorM;
     if (!strides || step.is_last) plan->root_m = step.root_m;
@@ -675,10 +672,9 @@ WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
   if (step) {
     const double climb_m =
         step->print.position_m.y - stance.feet[static_cast<std::size_t>(step->moved)].position_m.y;
-    if (!walk.speed_m_s && step->plan.max_rate == 1.0 && std::fabs(climb_m) <= kUnhurriedClimbM) {
-      step->plan.max_rate = kBriskRate;
-      step->plan.brisk_s = kBriskStrideS;
-      step->plan.slow_s = kSlowStrideS;
+    if (!walk.speed_m_s && step->plan.pace.max_rate == 1.0 &&
+        std::fabs(climb_m) <= kUnhurriedClimbM) {
+      step->plan.pace = kBriskPace;
     }
     progress.is_aimed[static_cast<std::size_t>(step->moved)] = step->is_last;
     return {.outcome = WalkOutcome::kStep, .plan = step->plan};

@@ -53,7 +53,7 @@ constexpr double kLongSideStepM = 0.345;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
 // Expected duration of a stride, for comparing paths to a goal. Steps that turn on the spot or lead
-// sideways or backward are played fast (RequestPlan::max_rate) and take kQuickStepS.
+// sideways or backward are played fast (RequestPlan::pace) and take kQuickStepS.
 constexpr double kStrideS = 0.62;
 // If a library has only strides, or no steps backward, the avatar steps sideways only if that saves
 // more than this time.
