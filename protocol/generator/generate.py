@@ -5,7 +5,7 @@ KIND is one of:
   cpp     limits.h, message_type.h, message_structs.h, message_list.h, codec.h and codec.cpp
   client  client/request_from_c.h, for the C API of the client
   json    fields_json.h and fields_json.cpp, for the test vectors
-  web     messages.ts and tables.ts for the web client, and json.ts for its tests
+  web     messages.ts and codec.ts for the web client, and json.ts for its tests
 
 Files whose content does not change are not written, so that nothing is compiled again.
 """
@@ -17,7 +17,7 @@ from c_api import CApi
 from cpp import Cpp
 from cpp_json import CppJson
 from schema import Schema, SchemaError
-from typescript import TypeScript
+from typescript_codec import TypeScriptCodec
 
 
 def files(schema, kind):
@@ -35,9 +35,8 @@ def files(schema, kind):
     if kind == "client":
         return {"client/request_from_c.h": CApi(schema).header()}
     if kind == "web":
-        web = TypeScript(schema)
-        return {"messages.ts": web.messages(), "tables.ts": web.tables(),
-                "json.ts": web.json()}
+        web = TypeScriptCodec(schema)
+        return {"messages.ts": web.messages(), "codec.ts": web.codec(), "json.ts": web.json()}
     sys.exit(f"generate.py: unknown kind '{kind}'\n{__doc__}")
 
 

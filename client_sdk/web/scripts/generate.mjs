@@ -10,7 +10,7 @@ const path = (url) => fileURLToPath(new URL(url, import.meta.url));
 const schema = path('../../../protocol/schema/stridewire.fbs');
 const generator = path('../../../protocol/generator');
 const out = path('../generated');
-const last = `${out}/tables.ts`;
+const last = `${out}/codec.ts`;
 
 function run(variable, program, debianPackage, args) {
   const command = process.env[variable] || program;

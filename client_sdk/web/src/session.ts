@@ -13,9 +13,10 @@ import {
 } from '../generated/messages';
 import * as commands from './wire/commands';
 import {avatarStateOf, eventOf, terrainOf} from './wire/convert';
-import {Malformed} from './wire/malformed';
-import {frameHeaderBytes, readMessage, typeOfFrame} from './wire/read';
-import {writeMessage, type Draft} from './wire/write';
+import {Malformed} from './wire/check';
+import {
+  frameHeaderBytes, readMessage, typeOfFrame, writeMessage, type Draft
+} from './wire/frame';
 import {WorldHandle} from './world';
 
 const inspectTimeoutS = 10;

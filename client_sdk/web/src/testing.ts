@@ -3,8 +3,7 @@ import {MessageType, type Message} from '../generated/messages';
 import {native} from './native';
 import {createCrowdPose, reserve} from './pose_buffers';
 import type {CrowdPose} from './types';
-import {readMessage, typeOfFrame} from './wire/read';
-import {writeMessage} from './wire/write';
+import {readMessage, typeOfFrame, writeMessage} from './wire/frame';
 
 export type {Message} from '../generated/messages';
 

@@ -1,72 +1,11 @@
 import assert from 'node:assert/strict';
-import {readFileSync, readdirSync} from 'node:fs';
 import {test} from 'node:test';
 import {Builder} from 'flatbuffers';
-import {tableNumbers, tables} from '../generated/tables';
 import * as wire from '../generated/wire';
 import type {MessageName} from '../generated/messages';
 import {decodeMessage, type Sender} from '../src/testing';
-import {root} from './support/environment';
 import {makeFrame} from './support/frame';
 import {readVectors} from './support/vectors';
-
-/** Extracts from flatc's generated reader of a table the expressions that read each field. */
-function readersOf(table: string): ({reads: string} | undefined)[] {
-  const folder = `${root}client_sdk/web/generated/stridewire/wire`;
-  const file = readdirSync(folder).find((name) =>
-      name.replace(/\.ts$/, '').replace(/-/g, '') === table.toLowerCase())!;
-  const source = readFileSync(`${folder}/${file}`, 'utf8');
-  const fields: ({reads: string} | undefined)[] = [];
-  for (const [, number, reads] of
-       source.matchAll(/__offset\(this\.bb_pos, (\d+)\);\n\s*return offset \? (.*?) :/g)) {
-    const field = (Number(number) - 4) / 2;
-    fields[field] = {reads: (fields[field]?.reads ?? '') + '\n' + reads!};
-  }
-  return fields;
-}
-
-test('the layout of each table agrees with the generated readers', () => {
-  const bytes: {[read: string]: number} = {
-    readInt8: 1, readUint8: 1, readInt16: 2, readUint16: 2, readInt32: 4, readUint32: 4,
-    readFloat32: 4, readInt64: 8, readUint64: 8, readFloat64: 8,
-  };
-  for (const [table, number] of Object.entries(tableNumbers)) {
-    const fields = readersOf(table);
-    if (tables[number]!.struct !== undefined) continue;
-    const layouts = tables[number]!.fields.map(({layout}) => layout);
-    assert.equal(layouts.length, fields.length, table);
-    layouts.forEach(([kind, size, align], i) => {
-      if (fields[i] === undefined) return;  // Deprecated fields have no reader.
-      const {reads} = fields[i];
-      const where = `${table}, field ${i}: ${reads.trim()}`;
-      const single = /read\w+(?=\(this\.bb_pos \+ offset\))/.exec(reads)?.[0];
-      const element = /read\w+(?=\(this\.bb!\.__vector)/.exec(reads)?.[0];
-      const stride = /index \* (\d+)/.exec(reads)?.[1];
-      if (reads.includes('__string')) {
-        assert.deepEqual([kind, size, align], [1, 1, 1], where);
-      } else if (reads.includes('__vector') && reads.includes('__indirect')) {
-        assert.equal(kind, 4, where);
-        assert.ok(reads.includes(`new ${Object.keys(tableNumbers)[size]}())`), where);
-      } else if (reads.includes('__vector')) {
-        assert.equal(kind, 2, where);
-        assert.equal(size, stride === undefined ? bytes[element!] : Number(stride), where);
-      } else if (reads.includes('__indirect')) {
-        assert.equal(kind, 3, where);
-        assert.ok(reads.includes(`new ${Object.keys(tableNumbers)[size]}())`), where);
-      } else {
-        assert.equal(kind, 0, where);
-        if (single !== undefined) {
-          assert.deepEqual([size, align], [bytes[single], bytes[single]], where);
-        } else {
-          const struct = /new (\w+)\(\)/.exec(reads)![1]!;
-          const structs: {[name: string]: number[]} =
-              {Vec3: [24, 8], Offset: [12, 4], GroundPoint: [16, 8]};
-          assert.deepEqual([size, align], structs[struct], where);
-        }
-      }
-    });
-  }
-});
 
 test('rejects truncated messages', () => {
   for (const {name, frame} of readVectors()) {

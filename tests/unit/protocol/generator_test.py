@@ -12,7 +12,7 @@ sys.path.insert(0, str(ROOT / "protocol" / "generator"))
 from cpp import Cpp  # noqa: E402
 from cpp_json import CppJson  # noqa: E402
 from schema import Schema, SchemaError  # noqa: E402
-from typescript import TypeScript  # noqa: E402
+from typescript_codec import TypeScriptCodec  # noqa: E402
 
 SMALL = """
 namespace test;
@@ -237,14 +237,23 @@ class VariantTest(unittest.TestCase):
         self.assertIn("    case 1: FromJson(json, m.movement.emplace<RunMovement>()); break;",
                       source)
 
-    def test_web_client_knows_which_fields_are_used(self):
-        tables = TypeScript(read(VARIANT)).tables()
-        self.assertIn('"absent": true, "only": ["hop", "run"], "without": "at"', tables)
+    def test_web_client_reads_and_checks_only_used_fields(self):
+        codec = TypeScriptCodec(read(VARIANT)).codec()
+        for line in ("  far: (type === 'hop' || type === 'run') && !Boolean(at) ? w.far() : 0,",
+                     "  const farValue = (type === 'hop' || type === 'run') && "
+                     "!(Boolean(at) && type === 'run') ? check.real(far, at.of('far')) : null;",
+                     "  if (farValue !== null) b.addFieldFloat64(2, farValue, 0);",
+                     " : check.unused(high, at.of('high'), 'is only allowed for the types hop');"):
+            self.assertIn(line, codec)
+
+    def test_web_client_converts_only_used_fields_to_json(self):
+        json = TypeScriptCodec(read(VARIANT)).json()
+        self.assertIn("  if (m.type === 'hop' && !isEmpty(m.high)) json.high = m.high;", json)
 
 
 class TypeScriptTest(unittest.TestCase):
     def setUp(self):
-        self.web = TypeScript(read(SMALL))
+        self.web = TypeScriptCodec(read(SMALL))
 
     def test_writes_interfaces_with_the_names_of_cpp(self):
         messages = self.web.messages()
@@ -253,15 +262,19 @@ class TypeScriptTest(unittest.TestCase):
             self.assertIn(line, messages)
         self.assertNotIn("old", messages)
 
-    def test_writes_layouts(self):
-        tables = self.web.tables()
-        self.assertIn('"name": "items", "layout": [4, 1, 4], "type": "table", "table": 1, '
-                      '"list": true', tables)
-        self.assertIn('"name": "place", "layout": [0, 16, 8]', tables)
-        for flag in ('"inverted": true', '"initial": null', '"tuple": true'):
-            self.assertIn(flag, tables)
-        self.assertIn('"name": "z", "layout": [0, 4, 4], "type": "float", "initial": 0.0, "at": 8',
-                      tables)
+    def test_reads_and_builds_tables(self):
+        codec = self.web.codec()
+        for line in ("  color: enums.Color[w.color()]!,", "  visible: !w.hidden(),",
+                     "  items: list(w.itemsLength(), (i) => readItem(w.items(i))),",
+                     "  speedMS: w.speedMS(),", "  place: readPoint(w.place()),",
+                     "  const {seq, color, text, items, visible, place} = "
+                     "check.object(fields, at);",
+                     "  b.addFieldInt8(5, Number(!visibleValue), 0);",
+                     "  if (speedMSValue !== null) b.addFieldFloat64(1, speedMSValue, NaN);",
+                     "  b.addFieldStruct(6, wire.Point.createPoint(b, ...placeValue), 0);",
+                     " = check.integer(avatar, at.of('avatar'), 0, 4294967295);"):
+            self.assertIn(line, codec)
+        self.assertNotIn("old", codec)
 
 
 class StandardTest(unittest.TestCase):

@@ -1,24 +1,17 @@
 import type {LayerRequest, MovementRequest, Observation, Region, Terrain} from '../types';
 import type {PoseDetail, Region as RegionEntry} from '../../generated/messages';
-import {Malformed} from './malformed';
-import type {Draft} from './write';
+import * as check from './check';
+import type {Draft} from './frame';
 
 /**
  * Functions that make messages from the arguments of the public interface. writeMessage checks the
  * types of the values, and the WebAssembly module checks their ranges.
  */
 
-/** Checks that an argument is a list, and converts its entries. */
+/** Checks that an argument is a list of objects, and converts its entries. */
 function convert<T, U>(items: readonly T[], field: string, entry: (item: T) => U): U[] {
-  if (items === null || typeof items !== 'object' || typeof items.length !== 'number') {
-    throw new Malformed(`${field}: expected a list`);
-  }
-  return Array.from(items, (item, i) => {
-    if (item === null || item === undefined) {
-      throw new Malformed(`${field}[${i}]: expected an object`);
-    }
-    return entry(item);
-  });
+  return check.list(items, new check.Place(field),
+                    (item, at) => entry(check.object(item, at) as T));
 }
 
 /** Calls `nextId` for the id of each request that has none. */
@@ -31,7 +24,7 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
 
 export function setTerrain(terrain: Terrain | null): Draft {
   if (terrain !== null && typeof terrain !== 'object') {
-    throw new Malformed('terrain: expected an object or null');
+    throw new check.Malformed('terrain: expected an object or null');
   }
   return {
     type: 'SetTerrain',
@@ -46,12 +39,8 @@ export function setTerrain(terrain: Terrain | null): Draft {
 export function setLayers(items: readonly LayerRequest[]): Draft {
   return {
     type: 'SetLayers',
-    items: convert(items, 'items', ({enabled = true, ...item}) => {
-      if (typeof enabled !== 'boolean') {
-        throw new Malformed('items.enabled: expected true or false');
-      }
-      return {...item, fadeOut: !enabled};
-    }),
+    items: convert(items, 'items', ({enabled = true, ...item}) =>
+        ({...item, fadeOut: !check.truth(enabled, new check.Place('items.enabled'))})),
   };
 }
 
@@ -61,9 +50,7 @@ export type ObserveDraft = Draft & {
 };
 
 export function observe(observation: Observation): ObserveDraft {
-  if (observation === null || typeof observation !== 'object') {
-    throw new Malformed('observation: expected an object');
-  }
+  check.object(observation, new check.Place('observation'));
   const {detail = 'all', withEvents} = observation;
   return {
     ...observation,
@@ -77,9 +64,7 @@ export function observe(observation: Observation): ObserveDraft {
 
 /** `beyond` is the detail of the observation, which applies beyond the rings of the region. */
 export function region(asked: Region, beyond: PoseDetail): RegionEntry {
-  if (asked === null || typeof asked !== 'object') {
-    throw new Malformed('region: expected an object');
-  }
+  check.object(asked, new check.Place('region'));
   const rings = asked.rings ?? [];
   return {
     centreM: [asked.x, asked.z],

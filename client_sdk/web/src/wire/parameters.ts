@@ -4,18 +4,8 @@ export const parameterNames: readonly ParameterName[] = [
   'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height'
 ];
 
-interface ParameterValue {
-  readonly name: number;
-  readonly value: number;
-}
-
-/** Converts a list of parameters to an object. */
-export function parametersOf(list: readonly ParameterValue[]): Parameters {
-  return Object.fromEntries(list.map(({name, value}) => [parameterNames[name], value]));
-}
-
-/** The reverse of parametersOf. */
-export function parameterList(parameters: Parameters): ParameterValue[] {
-  return Object.entries(parameters).map(
-      ([name, value]) => ({name: parameterNames.indexOf(name as ParameterName), value}));
+/** Returns value and number of each parameter, as in the struct ParameterValue. */
+export function parameterList(parameters: unknown): [value: number, name: number][] {
+  return Object.entries(parameters as Parameters).map(
+      ([name, value]) => [value, parameterNames.indexOf(name as ParameterName)]);
 }

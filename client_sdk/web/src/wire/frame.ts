@@ -1,0 +1,50 @@
+import {Builder, ByteBuffer} from 'flatbuffers';
+import {builders, readers} from '../../generated/codec';
+import {MessageType, type Message, type MessageName} from '../../generated/messages';
+import {Place, type Fields} from './check';
+
+/** A message whose values have not been checked. */
+export type Draft = Fields & {readonly type: MessageName};
+
+export const frameHeaderBytes = 16;
+const magic = 0x1a505753;  // "SWP", 0x1a
+const frameVersion = 1;
+const builder = new Builder(1024);
+const names = new Map<number, MessageName>(
+    Object.entries(MessageType).map(([name, type]) => [type, name as MessageName]));
+
+/** Returns the type number of the message in a frame. */
+export function typeOfFrame(frame: ArrayBuffer): number {
+  return frame.byteLength < frameHeaderBytes ? 0 : new DataView(frame).getUint16(6, true);
+}
+
+/** Reads a message from a frame that the WebAssembly module has accepted: this function checks
+ * nothing. Lists of numbers are views of the frame. */
+export function readMessage(frame: ArrayBuffer): Message {
+  const bytes = new ByteBuffer(new Uint8Array(frame));
+  bytes.setPosition(frameHeaderBytes);
+  return readers[names.get(typeOfFrame(frame))!](bytes);
+}
+
+/**
+ * Writes a message as a frame. Properties may be absent if the schema states a default. Absent
+ * `seq`, `world` and `subscription` are written as 1, because the WebAssembly module sets them in
+ * commands.
+ * @throws Malformed a value has the wrong type, or does not fit into the type of its field. The
+ *     WebAssembly module checks everything else.
+ */
+export function writeMessage(message: Draft): Uint8Array<ArrayBuffer> {
+  builder.clear();
+  builder.finish(builders[message.type](
+      builder, {seq: 1, world: 1, subscription: 1, ...message}, new Place('')));
+  const payload = builder.asUint8Array();
+  const bytes = Math.ceil(payload.length / 8) * 8;
+  const frame = new Uint8Array(frameHeaderBytes + bytes);
+  const view = new DataView(frame.buffer);
+  view.setUint32(0, magic, true);
+  view.setUint16(4, frameVersion, true);
+  view.setUint16(6, MessageType[message.type], true);
+  view.setUint32(8, bytes, true);
+  frame.set(payload, frameHeaderBytes);
+  return frame;
+}
