@@ -24,7 +24,8 @@ ConstPoseSpan PoseRecording::Decoded::pose(std::size_t i) const {
 }
 
 void PoseRecording::Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
-                        const std::shared_ptr<const protocol::CompactCodecs>& codecs) {
+                        const std::shared_ptr<const protocol::CompactCodecs>& codecs,
+                        std::span<const protocol::AvatarId> moving) {
   if (!enabled()) return;
   const protocol::PoseBatchInfo& info = batch.info;
   // Streams of regions have negative keys, one per mode and shard.
@@ -49,9 +50,10 @@ void PoseRecording::Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
   last->parts.push_back(Part{info.part,
                              {batch.avatars.begin(), batch.avatars.end()},
                              {batch.flags.begin(), batch.flags.end()},
-                             {batch.poses.begin(), batch.poses.end()}});
+                             {batch.poses.begin(), batch.poses.end()},
+                             {moving.begin(), moving.end()}});
   const std::size_t bytes = sizeof(Tick) + sizeof(Part) + batch.avatars.size_bytes() +
-                            batch.flags.size() + batch.poses.size();
+                            batch.flags.size() + batch.poses.size() + moving.size_bytes();
   last->bytes += bytes;
   bytes_ += bytes;
   last_time_s_ = std::fmax(last_time_s_, info.server_time_s);  // Ignores NaN.
@@ -60,6 +62,7 @@ void PoseRecording::Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
 
 void PoseRecording::Clear() {
   streams_.clear();
+  movements_.Clear();
   bytes_ = 0;
   last_time_s_ = std::numeric_limits<double>::quiet_NaN();
 }
@@ -88,10 +91,12 @@ void PoseRecording::DropOld() {
         oldest = it;
       }
     }
-    if (oldest == streams_.end()) return;
+    if (oldest == streams_.end()) return movements_.Clear();
     auto& [key, stream] = *oldest;
     const Tick& tick = stream.ticks.front();
-    if (tick.info.server_time_s >= last_time_s_ - length_s_ && bytes() <= max_bytes_) return;
+    if (tick.info.server_time_s >= last_time_s_ - length_s_ && bytes() <= max_bytes_) {
+      return movements_.DropBefore(tick.info.tick);
+    }
     Discard(stream, tick);
     bytes_ -= tick.bytes;
     stream.ticks.pop_front();
@@ -127,7 +132,7 @@ const PoseRecording::Decoded* PoseRecording::Decode(Stream& stream, const Tick& 
   }
   const std::size_t joints = tick.info.joint_count;
   std::size_t count = 0;
-  for (const Part& part : tick.parts) count += part.avatars.size();
+  for (const Part& part : tick.parts) count += part.avatars.size() + part.moving.size();
   unsorted_.Resize(count, joints);
   std::size_t index = 0;
   for (const Part& part : tick.parts) {
@@ -145,6 +150,7 @@ const PoseRecording::Decoded* PoseRecording::Decode(Stream& stream, const Tick& 
                     .standing = (part.flags[i] & protocol::kPoseStanding) != 0,
                     .detail = protocol::DetailOf(tick.info.mode)});
     }
+    index += movements_.Evaluate(tick.info.tick, part.moving, unsorted_, index);
   }
   order_.resize(index);
   std::iota(order_.begin(), order_.end(), std::size_t{0});

@@ -7,9 +7,11 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "crowd_pose.h"
+#include "movement_recording.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
 #include "stridewire/runtime/pose.h"
@@ -38,9 +40,11 @@ class PoseRecording {
   /// Adds a copy of a batch. `codecs` decodes its poses if they are compact. Poses of different
   /// epochs are not interpolated. If a tick of a shard arrives in two modes, only the first one is
   /// stored. Regions are an exception, because their batches in different modes contain different
-  /// avatars.
+  /// avatars. `moving` contains avatars of the tick whose movements were added to `movements()`.
   void Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
-           const std::shared_ptr<const protocol::CompactCodecs>& codecs);
+           const std::shared_ptr<const protocol::CompactCodecs>& codecs,
+           std::span<const protocol::AvatarId> moving = {});
+  [[nodiscard]] MovementRecording& movements() { return movements_; }
 
   void Clear();
 
@@ -48,7 +52,7 @@ class PoseRecording {
   [[nodiscard]] double first_time_s() const;
   [[nodiscard]] double last_time_s() const { return last_time_s_; }
   /// Returns the memory of batches and decoded ticks.
-  [[nodiscard]] std::size_t bytes() const { return bytes_ + DecodedBytes(); }
+  [[nodiscard]] std::size_t bytes() const { return bytes_ + movements_.bytes() + DecodedBytes(); }
 
   /// Computes the poses at `time_s` of all avatars for which `wants` returns true. Outside the
   /// recorded time, `out` is empty. Like PoseHistory, it does not interpolate across
@@ -62,6 +66,7 @@ class PoseRecording {
     std::vector<protocol::AvatarId> avatars;
     std::vector<std::uint8_t> flags;
     std::vector<std::byte> poses;
+    std::vector<protocol::AvatarId> moving;  ///< Avatars whose poses follow from `movements_`.
   };
   struct Tick {
     protocol::PoseBatchInfo info;
@@ -104,6 +109,7 @@ class PoseRecording {
   double length_s_;
   std::size_t max_bytes_;
   std::map<std::int32_t, Stream> streams_;
+  MovementRecording movements_;
   std::size_t bytes_ = 0;  ///< Memory of all batches.
   double last_time_s_ = std::numeric_limits<double>::quiet_NaN();
   std::uint64_t use_count_ = 0;

@@ -179,15 +179,22 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseS
 }
 
 void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
-                       ConstPoseSpan pose) {
+                       const AvatarReplica& replica) {
   if (!Wants(avatar)) return;
   Track* track = FindOrAddTrack(avatar);
   if (track == nullptr) {
     ++replica_counts_->refused;
     return;
   }
+  const ConstPoseSpan pose = replica.pose();
   Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose, *replica_counts_);
   if (!recording_.enabled()) return;
+  if (replica.movement() != nullptr && !replica.has_layers()) {
+    moving_.push_back(avatar);
+    recording_.movements().Add(avatar, stamp, replica, replicas_->library(), replicas_->tick_s(),
+                               track->recorded);
+    return;
+  }
   evaluated_.push_back(avatar);
   evaluated_flags_.push_back(
       static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
@@ -212,7 +219,7 @@ void WorldView::EncodeBlock(const protocol::CompactCodec& codec) {
 }
 
 void WorldView::RecordEvaluated(const protocol::Movements& movements) {
-  if (evaluated_.empty()) return;
+  if (evaluated_.empty() && moving_.empty()) return;
   const std::size_t joints = skeleton_.joints.size();
   protocol::PoseMode mode = protocol::PoseMode::kCompact;
   if (fits_ && block_.size() > 0) EncodeBlock(*codecs_->Find(mode));
@@ -241,12 +248,12 @@ void WorldView::RecordEvaluated(const protocol::Movements& movements) {
                   .avatars = evaluated_,
                   .flags = evaluated_flags_,
                   .poses = encoded_},
-                 epoch_, codecs_);
+                 epoch_, codecs_, moving_);
 }
 
 Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replicas,
                         std::uint64_t every_n_ticks, Counts& counts) {
-  if (replicas.library().skeleton().joints.size() != skeleton_.joints.size()) {
+  if (replicas.library()->skeleton().joints.size() != skeleton_.joints.size()) {
     return Fail(ErrorCode::kShapeMismatch,
                 "the library has another number of joints than the skeleton");
   }
@@ -254,6 +261,8 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
   newest_time_s_ = std::max(newest_time_s_, movements.server_time_s);
   replica_every_n_ticks_ = std::max<std::uint64_t>(every_n_ticks, 1);
   replica_counts_ = &counts;
+  replicas_ = &replicas;
+  moving_.clear();
   evaluated_.clear();
   evaluated_flags_.clear();
   encoded_.clear();

@@ -129,8 +129,8 @@ class WorldView : public PoseSink {
     }
   }
 
-  /// The poses of the last seconds, as received batches, or in compact form if they were evaluated.
-  /// Clear also clears them.
+  /// The poses of the last seconds, as received batches. If they were evaluated, the recording
+  /// contains the movements, and the poses with layers in compact form. Clear also clears them.
   [[nodiscard]] PoseRecording& recording() { return recording_; }
 
   /// Samples all avatars at a server time, for display, and counts the poses.
@@ -154,6 +154,7 @@ class WorldView : public PoseSink {
     std::uint64_t epoch = 0;
     std::uint32_t segment = 0;  ///< Segment of the newest pose.
     bool gone = false;
+    MovementRecording::Cursor recorded;
   };
   struct Shard {
     std::uint64_t tick = 0;  ///< Tick of the last batch.
@@ -164,7 +165,7 @@ class WorldView : public PoseSink {
   using Lane = std::pair<std::uint16_t, protocol::PoseMode>;  // shard, mode
 
   void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
-              ConstPoseSpan pose) override;
+              const AvatarReplica& replica) override;
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
   [[nodiscard]] std::uint64_t EveryNTicks() const override { return replica_every_n_ticks_; }
@@ -213,9 +214,12 @@ class WorldView : public PoseSink {
   std::vector<Quat> scratch_;
   // Interval of poses in ticks, as requested. Set while Apply(Movements) runs.
   std::uint64_t replica_every_n_ticks_ = 1;
-  Counts* replica_counts_ = nullptr;  // Counters to update. Set while Apply(Movements) runs.
-  // Poses of one message for the recording, in the order of evaluation, and their encoding. The
-  // last poses are still in `block_` and not encoded yet.
+  const ReplicaSet* replicas_ = nullptr;  // Set while Apply(Movements) runs.
+  Counts* replica_counts_ = nullptr;      // Counters to update. Set while Apply(Movements) runs.
+  // Avatars of one message whose movements are recorded.
+  std::vector<protocol::AvatarId> moving_;
+  // Other poses of one message for the recording, in the order of evaluation, and their encoding.
+  // The last poses are still in `block_` and not encoded yet.
   std::vector<protocol::AvatarId> evaluated_;
   std::vector<std::uint8_t> evaluated_flags_;
   std::vector<std::byte> encoded_;

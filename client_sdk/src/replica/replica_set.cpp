@@ -59,7 +59,7 @@ void ReplicaSet::EmitPose(const protocol::Movements& message, Avatar& avatar, Po
                         .time_s = message.server_time_s,
                         .discontinuity = std::exchange(avatar.discontinuity, false),
                         .standing = avatar.replica->idle()};
-  sink.OnPose(avatar.id, message.shard, stamp, avatar.replica->pose());
+  sink.OnPose(avatar.id, message.shard, stamp, *avatar.replica);
 }
 
 // Advances the avatars in `due_` by one tick. Passes their poses to the sink if `emits` is true and

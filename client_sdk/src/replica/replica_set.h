@@ -17,9 +17,10 @@ class PoseSink {
  public:
   virtual ~PoseSink() = default;
 
-  /// Called when an avatar has a new pose. `pose` is valid until the call returns.
+  /// Called when an avatar has a new pose, replica.pose(). `replica` is valid until the call
+  /// returns.
   virtual void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
-                      ConstPoseSpan pose) = 0;
+                      const AvatarReplica& replica) = 0;
 
   /// Called when an avatar is removed or leaves the subscription, or when its state is discarded
   /// because a message is missing.
@@ -56,7 +57,9 @@ class ReplicaSet {
   /// server sends their next states.
   [[nodiscard]] Status Apply(const protocol::Movements& message, PoseSink& sink);
 
-  [[nodiscard]] const MotionLibrary& library() const { return *library_; }
+  [[nodiscard]] const std::shared_ptr<const MotionLibrary>& library() const { return library_; }
+  /// Length of a tick in seconds.
+  [[nodiscard]] double tick_s() const { return tick_s_; }
   [[nodiscard]] std::size_t avatar_count() const { return avatar_count_; }
 
  private:

@@ -180,7 +180,8 @@ class BatchSink final : public client::PoseSink {
         wants_(std::move(wants)) {}
 
   void OnPose(protocol::AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
-              ConstPoseSpan pose) override {
+              const AvatarReplica& replica) override {
+    const ConstPoseSpan pose = replica.pose();
     const std::size_t begin = poses.size();
     poses.resize(begin + bytes_);
     const Status encoded = protocol::EncodePose(protocol::PoseMode::kFull, pose.root_position_m,

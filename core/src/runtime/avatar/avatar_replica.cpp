@@ -179,7 +179,10 @@ Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& 
   STRIDEWIRE_CHECK(&scratch.library() == &library());
   Reader reader(record);
   const unsigned flags = reader.Flags();
-  if ((flags & (record::kIsState | record::kLeft | record::kMoves)) != 0) ahead_count_ = 0;
+  if ((flags & (record::kIsState | record::kLeft | record::kMoves)) != 0) {
+    ahead_count_ = 0;
+    ++movement_number_;
+  }
   if ((flags & record::kIsState) != 0) {
     ReadState(flags, reader);
   } else if (!is_known_) {

@@ -79,6 +79,12 @@ class AvatarReplica {
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
+  /// Changes whenever a record begins or sets a movement. A movement does not change meanwhile.
+  [[nodiscard]] std::uint32_t movement_number() const { return movement_number_; }
+  /// Time since the start of the movement, of the last tick. Undefined while standing.
+  [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
+  /// True if layers change the displayed pose.
+  [[nodiscard]] bool has_layers() const { return body_.has_layers; }
   [[nodiscard]] const MotionLibrary& library() const { return *body_.library; }
 
  private:
@@ -101,6 +107,7 @@ class AvatarReplica {
 
   AvatarBody body_;
   double movement_time_s_ = 0.0;
+  std::uint32_t movement_number_ = 0;
   bool is_known_ = false;
   bool is_moving_ = false;
   bool is_idle_ = false;

@@ -1,0 +1,105 @@
+#include "movement_recording.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/check.h"
+
+namespace stridewire::client {
+
+void MovementRecording::Add(protocol::AvatarId avatar, const PoseStamp& stamp,
+                            const AvatarReplica& replica,
+                            const std::shared_ptr<const MotionLibrary>& library, double tick_s,
+                            Cursor& cursor) {
+  if (library_ != library) {
+    Clear();
+    library_ = library;
+  }
+  // The time differs if the server has skipped ticks.
+  constexpr double kMaxDifferenceS = 1e-6;
+  const std::uint64_t ticks = stamp.tick - cursor.begin_tick;
+  if (cursor.recording == number_ && cursor.movement == replica.movement_number() &&
+      cursor.standing == stamp.standing && !stamp.discontinuity && ticks < kMaxTicks &&
+      std::fabs(cursor.begin_s + static_cast<double>(ticks) * tick_s - replica.movement_time_s()) <
+          kMaxDifferenceS) {
+    return;
+  }
+  STRIDEWIRE_CHECK(replica.movement() != nullptr);
+  auto movement = std::make_unique<Movement>(*replica.movement());
+  if (!movement->is_inertial) movement->difference_velocity = {};
+  const std::size_t bytes = sizeof(Span) + sizeof(Movement) +
+                            movement->weights.size() * sizeof(float) +
+                            movement->difference.rotations.size() * sizeof(Quat) +
+                            movement->difference_velocity.joints_rad_s.size() * sizeof(Vec3);
+  spans_.push_back({.avatar = avatar,
+                    .flags = CrowdFlagsOf(stamp),
+                    .begin_tick = stamp.tick,
+                    .begin_s = replica.movement_time_s(),
+                    .tick_s = tick_s,
+                    .movement = std::move(movement),
+                    .bytes = bytes});
+  bytes_ += bytes;
+  cursor = {.recording = number_,
+            .movement = replica.movement_number(),
+            .standing = stamp.standing,
+            .begin_tick = stamp.tick,
+            .begin_s = replica.movement_time_s()};
+}
+
+std::size_t MovementRecording::Evaluate(std::uint64_t tick,
+                                        std::span<const protocol::AvatarId> avatars, CrowdPose& out,
+                                        std::size_t at) {
+  if (spans_.empty()) return 0;
+  // The last movement of each avatar that begins at or before the tick.
+  found_.assign(avatars.size(), nullptr);
+  for (auto span = spans_.rbegin(); span != spans_.rend(); ++span) {
+    if (span->begin_tick > tick) continue;
+    // Twice the maximum, because the ticks of shards differ.
+    if (tick - span->begin_tick > 2 * kMaxTicks) break;
+    const auto place = std::ranges::lower_bound(avatars, span->avatar);
+    if (place == avatars.end() || *place != span->avatar) continue;
+    const Span*& found = found_[static_cast<std::size_t>(place - avatars.begin())];
+    if (found == nullptr) found = &*span;
+  }
+  if (!evaluator_) evaluator_.emplace(*library_, 1);
+  std::size_t count = 0;
+  for (const Span* span : found_) {
+    if (span == nullptr) continue;
+    const std::uint64_t ticks = tick - span->begin_tick;
+    const double time_s = span->begin_s + static_cast<double>(ticks) * span->tick_s;
+    const std::size_t index = at + count++;
+    batcher_.Add({.movement = span->movement.get(), .time_s = time_s, .step_s = span->tick_s}, 1,
+                 static_cast<std::uint32_t>(index));
+    out.avatars[index] = span->avatar;
+    // Only the first pose may be a discontinuity.
+    out.flags[index] =
+        ticks == 0 ? span->flags : static_cast<std::uint8_t>(span->flags & ~kCrowdDiscontinuity);
+  }
+  batcher_.Evaluate(*evaluator_, [&out](std::span<const EvaluationBatcher::Item> items, int,
+                                        const SoaPose& poses) {
+    for (std::size_t lane = 0; lane < items.size(); ++lane) {
+      const std::size_t index = items[lane].tag;
+      poses.Get(lane, {out.roots_m[index],
+                       std::span(out.rotations).subspan(index * out.joint_count, out.joint_count)});
+    }
+  });
+  return count;
+}
+
+void MovementRecording::DropBefore(std::uint64_t tick) {
+  while (!spans_.empty() && spans_.front().begin_tick + kMaxTicks <= tick) {
+    bytes_ -= spans_.front().bytes;
+    spans_.pop_front();
+  }
+}
+
+void MovementRecording::Clear() {
+  spans_.clear();
+  bytes_ = 0;
+  evaluator_.reset();
+  library_.reset();
+  ++number_;
+}
+
+}  // namespace stridewire::client
