@@ -106,6 +106,16 @@ void PoseHistory::Prefetch(double time_s, bool is_near) const {
   }
 }
 
+void PoseHistory::PrefetchPush() const {
+  if (size_ == 0) return;
+  const std::size_t slot = Slot(size_ == stamps_.size() ? 0 : size_);
+  PrefetchBytes(&stamps_[Slot(size_ - 1)], sizeof(PoseStamp));
+  PrefetchBytes(&stamps_[slot], sizeof(PoseStamp));
+  PrefetchBytes(&slope_is_before_[slot], 1);
+  PrefetchBytes(&roots_m_[slot], sizeof(Vec3));
+  PrefetchBytes(&rotations_[slot * joint_count_], joint_count_ * sizeof(Quat));
+}
+
 std::optional<std::size_t> PoseHistory::FirstAfterTick(std::uint64_t tick) const {
   std::size_t low = 0;
   std::size_t high = size_;

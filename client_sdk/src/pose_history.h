@@ -71,6 +71,8 @@ class PoseHistory {
   /// Prefetches the poses that Display will probably read. First call it with `is_near` false, and
   /// later with true.
   void Prefetch(double time_s, bool is_near) const;
+  /// Prefetches what Push will probably read and write.
+  void PrefetchPush() const;
 
   /// Returns the index of the oldest pose with a tick above `tick`, if any.
   [[nodiscard]] std::optional<std::size_t> FirstAfterTick(std::uint64_t tick) const;

@@ -135,15 +135,30 @@ const WorldView::Track* WorldView::FindTrack(protocol::AvatarId avatar) const {
   return track != tracks_.end() && track->avatar == avatar ? &*track : nullptr;
 }
 
-WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
-  // A message contains the avatars of one shard in ascending order, so the search continues after
-  // the previous track. It passes a few tracks that belong to other shards, and then falls back to
-  // a binary search.
+std::size_t WorldView::FindTrackAfter(std::size_t index, protocol::AvatarId avatar) const {
+  // Passes a few tracks that belong to other shards.
   constexpr std::size_t kMaxSteps = 8;
-  std::size_t index = next_track_;
   const std::size_t end = std::min(index + kMaxSteps, tracks_.size());
   while (index < end && tracks_[index].avatar < avatar) ++index;
-  if (index >= end || tracks_[index].avatar != avatar) {
+  return index < end && tracks_[index].avatar == avatar ? index : tracks_.size();
+}
+
+void WorldView::Prefetch(protocol::AvatarId avatar) {
+  std::size_t index = FindTrackAfter(prefetched_track_, avatar);
+  if (index == tracks_.size()) {
+    const auto track = LowerBound(avatar);
+    if (track == tracks_.end() || track->avatar != avatar) return;
+    index = static_cast<std::size_t>(track - tracks_.begin());
+  }
+  prefetched_track_ = index + 1;
+  tracks_[index].history.PrefetchPush();
+}
+
+WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
+  // A message contains the avatars of one shard in ascending order, so the search continues after
+  // the previous track, and otherwise falls back to a binary search.
+  std::size_t index = FindTrackAfter(next_track_, avatar);
+  if (index == tracks_.size()) {
     auto track = LowerBound(avatar);
     index = static_cast<std::size_t>(track - tracks_.begin());
     if (track == tracks_.end() || track->avatar != avatar) {

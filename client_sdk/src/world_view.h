@@ -166,6 +166,7 @@ class WorldView : public PoseSink {
 
   void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
               const AvatarReplica& replica) override;
+  void Prefetch(protocol::AvatarId avatar) override;
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
   [[nodiscard]] std::uint64_t EveryNTicks() const override { return replica_every_n_ticks_; }
@@ -175,6 +176,9 @@ class WorldView : public PoseSink {
   /// Finds or creates the track of an avatar. Returns null if there is no memory for it. Calls with
   /// ascending ids are fast, because each search begins after the last track that was found.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
+  /// Returns the index of the track, or one after the end if it is not among the tracks shortly
+  /// after `index`.
+  [[nodiscard]] std::size_t FindTrackAfter(std::size_t index, protocol::AvatarId avatar) const;
   void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
 
   /// Records the poses of the avatars in `evaluated_`, which a message with movements has produced.
@@ -202,7 +206,8 @@ class WorldView : public PoseSink {
   std::vector<Track> tracks_;  // In ascending order of avatar ids.
   // Index after the last track that was found, where the next search starts.
   std::size_t next_track_ = 0;
-  std::size_t gone_count_ = 0;  // Number of tracks that are gone.
+  std::size_t prefetched_track_ = 0;  // Same for Prefetch.
+  std::size_t gone_count_ = 0;        // Number of tracks that are gone.
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;

@@ -22,6 +22,10 @@ class PoseSink {
   virtual void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                       const AvatarReplica& replica) = 0;
 
+  /// Called before OnPose for the same avatars in the same order, so that the sink can prefetch
+  /// what OnPose reads.
+  virtual void Prefetch(protocol::AvatarId) {}
+
   /// Called when an avatar is removed or leaves the subscription, or when its state is discarded
   /// because a message is missing.
   virtual void OnGone(protocol::AvatarId avatar) = 0;

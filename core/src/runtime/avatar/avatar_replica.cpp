@@ -7,11 +7,15 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "runtime/avatar/record_fields.h"
 #include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 namespace {
+
+// AdvanceAll prefetches the replica at this distance.
+constexpr std::size_t kPrefetched = 4;
 
 // Limits on the numbers in a record, in metres, seconds or radians, and on weights.
 constexpr double kMaxNumber = 1e9;
@@ -166,7 +170,8 @@ ReplicaEvaluator::ReplicaEvaluator(const MotionLibrary& library)
 }
 
 AvatarReplica::AvatarReplica(std::shared_ptr<const MotionLibrary> library)
-    : body_(std::move(library)), ahead_rotations_(kPosesAhead * body_.pose.rotations.size()) {
+    : ahead_rotations_(kPosesAhead * static_cast<std::size_t>(library->skeleton().joint_count())),
+      body_(std::move(library)) {
   body_.layered_pose = body_.pose;
   body_.layers.Reserve();
 }
@@ -190,6 +195,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& 
   } else {
     ReadChange(flags, reader, scratch);
   }
+  may_have_layers_ |= !body_.layers.empty();
   is_known_ = reader.ok();
   is_idle_ = (flags & record::kIsIdle) != 0;
   return reader.status();
@@ -327,6 +333,13 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   reader.Finish();
 }
 
+void AvatarReplica::PrefetchPose() const {
+  if (!is_moving_) return;
+  const ConstPoseSpan pose = AheadPose();
+  PrefetchBytes(&pose.root_position_m, sizeof(Vec3));
+  PrefetchBytes(pose.rotations.data(), pose.rotations.size_bytes());
+}
+
 void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, const Tick& tick,
                                ReplicaEvaluator& evaluator) {
   STRIDEWIRE_CHECK(tick.ticks_apart >= 1);
@@ -336,6 +349,7 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, const T
         replicas.subspan(begin, std::min(replicas.size() - begin, ReplicaEvaluator::kBatch));
     const MotionLibrary& library = batch.front()->library();
     for (std::size_t i = 0; i < batch.size(); ++i) {
+      if (i + kPrefetched < batch.size()) PrefetchBytes(batch[i + kPrefetched], kCacheLineBytes);
       AvatarReplica& replica = *batch[i];
       STRIDEWIRE_CHECK(&replica.library() == &library);
       if (!replica.is_known_ || !replica.is_moving_) continue;
@@ -351,27 +365,32 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, const T
                                        tick.ticks_apart, static_cast<int>(kPosesAhead - phase));
       evaluator.batcher_.Add({&movement, replica.movement_time_s_, tick.length_s, tick.ticks_apart},
                              count, static_cast<std::uint32_t>(i));
-      replica.ahead_count_ = static_cast<std::size_t>(count);
-      replica.ahead_ticks_apart_ = ticks_apart;
+      replica.ahead_count_ = static_cast<std::uint32_t>(count);
+      replica.ahead_ticks_apart_ = static_cast<std::uint32_t>(ticks_apart);
       replica.ahead_tick_ = 0;
     }
     evaluator.batcher_.Evaluate(
         evaluator.evaluator_,
         [&](std::span<const EvaluationBatcher::Item> items, int pose, const SoaPose& poses) {
-          for (std::size_t lane = 0; lane < items.size(); ++lane) {
-            if (pose >= items[lane].count) continue;
-            AvatarReplica& replica = *batch[items[lane].tag];
-            const std::size_t joints = replica.body_.pose.rotations.size();
+          std::array<Vec3*, SoaPose::kLanes> roots_m;
+          std::array<Quat*, SoaPose::kLanes> rotations;
+          std::size_t lanes = 0;
+          // Longer runs come before shorter ones.
+          for (; lanes < items.size() && pose < items[lanes].count; ++lanes) {
+            AvatarReplica& replica = *batch[items[lanes].tag];
             const auto at = static_cast<std::size_t>(pose);
-            poses.Get(lane, {replica.ahead_roots_m_[at],
-                             std::span(replica.ahead_rotations_).subspan(at * joints, joints)});
+            roots_m[lanes] = &replica.ahead_roots_m_[at];
+            rotations[lanes] = &replica.ahead_rotations_[at * poses.joint_count()];
           }
+          poses.GetFirst(std::span(roots_m).first(lanes), std::span(rotations).first(lanes));
         });
     for (AvatarReplica* replica : batch) {
       if (!replica->is_known_) continue;
+      replica->is_time_set_ = false;
+      const bool are_layers_set = std::exchange(replica->are_layers_set_, false);
+      if (!replica->may_have_layers_) continue;
       AvatarBody& body = replica->body_;
-      if (!replica->are_layers_set_) body.layers.Advance(library, tick.length_s);
-      replica->is_time_set_ = replica->are_layers_set_ = false;
+      if (!are_layers_set) body.layers.Advance(library, tick.length_s);
       if (!tick.has_poses) continue;
       if (replica->is_moving_ && !body.layers.empty()) {
         const ConstPoseSpan pose = replica->AheadPose();
@@ -379,6 +398,7 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, const T
         std::ranges::copy(pose.rotations, body.pose.rotations.begin());
       }
       body.ApplyLayers();
+      replica->may_have_layers_ = body.has_layers;
     }
   }
 }

@@ -73,7 +73,7 @@ class AvatarReplica {
   /// The displayed pose in world space, after AdvanceAll for a tick with poses. Undefined unless
   /// is_known().
   [[nodiscard]] ConstPoseSpan pose() const {
-    return is_moving_ && !body_.has_layers ? AheadPose() : body_.DisplayedPose();
+    return is_moving_ && !has_layers() ? AheadPose() : body_.DisplayedPose();
   }
   /// AvatarSimulation::idle() of the avatar: it stands and has no queued requests.
   [[nodiscard]] bool idle() const { return is_idle_; }
@@ -84,7 +84,9 @@ class AvatarReplica {
   /// Time since the start of the movement, of the last tick. Undefined while standing.
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// True if layers change the displayed pose.
-  [[nodiscard]] bool has_layers() const { return body_.has_layers; }
+  [[nodiscard]] bool has_layers() const { return may_have_layers_ && body_.has_layers; }
+  /// Prefetches what pose() returns.
+  void PrefetchPose() const;
   [[nodiscard]] const MotionLibrary& library() const { return *body_.library; }
 
  private:
@@ -101,11 +103,11 @@ class AvatarReplica {
   }
   [[nodiscard]] ConstPoseSpan AheadPose() const {
     const std::size_t i = ahead_tick_ / ahead_ticks_apart_;
-    const std::size_t joints = body_.pose.rotations.size();
+    const std::size_t joints = ahead_rotations_.size() / kPosesAhead;
     return {ahead_roots_m_[i], std::span(ahead_rotations_).subspan(i * joints, joints)};
   }
 
-  AvatarBody body_;
+  // The members that are read in every tick come first, in few cache lines.
   double movement_time_s_ = 0.0;
   std::uint32_t movement_number_ = 0;
   bool is_known_ = false;
@@ -115,12 +117,14 @@ class AvatarReplica {
   // must not advance it.
   bool is_time_set_ = false;
   bool are_layers_set_ = false;
+  bool may_have_layers_ = false;  // False: neither the body nor its displayed pose has layers.
   // Poses of the movement, without layers, for times that are ahead_ticks_apart_ ticks apart.
-  std::array<Vec3, kPosesAhead> ahead_roots_m_ = {};
+  std::uint32_t ahead_count_ = 0;
+  std::uint32_t ahead_ticks_apart_ = 1;
+  std::uint32_t ahead_tick_ = 0;       // Number of ticks since that of the first of these poses.
   std::vector<Quat> ahead_rotations_;  // [kPosesAhead][joint]
-  std::size_t ahead_count_ = 0;
-  std::size_t ahead_ticks_apart_ = 1;
-  std::size_t ahead_tick_ = 0;  // Number of ticks since that of the first of these poses.
+  std::array<Vec3, kPosesAhead> ahead_roots_m_ = {};
+  AvatarBody body_;
 };
 
 }  // namespace stridewire

@@ -317,6 +317,7 @@ HWY_EXPORT(BlendLayer);
 HWY_EXPORT(ComputeGridSamples);
 HWY_EXPORT(SinCos);
 HWY_EXPORT(Transpose);
+HWY_EXPORT(ScatterRotations);
 HWY_EXPORT(PrepareDifferences);
 HWY_EXPORT(FindLargestVelocities);
 HWY_EXPORT(FinishPoses);
@@ -354,6 +355,11 @@ void SinCos(const double* angles_rad, std::size_t count, double* sines, double* 
 
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to) {
   HWY_DYNAMIC_DISPATCH(Transpose)(from, count, lanes, to);
+}
+
+void ScatterRotations(const float* rotations, std::size_t joint_count, std::size_t lanes,
+                      float* const* to) {
+  HWY_DYNAMIC_DISPATCH(ScatterRotations)(rotations, joint_count, lanes, to);
 }
 
 void PrepareDifferences(const float* difference, std::size_t joint_count, std::size_t lanes,

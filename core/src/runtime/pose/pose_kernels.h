@@ -116,6 +116,10 @@ void SinCos(const double* angles_rad, std::size_t count, double* sines, double* 
 /// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to);
 
+/// to[lane][j] = rotations[j][x y z w][lane] for `joint_count` joints.
+void ScatterRotations(const float* rotations, std::size_t joint_count, std::size_t lanes,
+                      float* const* to);
+
 /// Number of floats per joint that PrepareDifferences writes: the rotation vector of half the short
 /// arc, and the square of its length.
 inline constexpr std::size_t kDifferenceFloats = 4;

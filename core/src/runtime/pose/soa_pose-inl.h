@@ -37,6 +37,18 @@ void Transpose(const float* const* from, std::size_t count, std::size_t lanes, f
   }
 }
 
+void ScatterRotations(const float* rotations, std::size_t joint_count, std::size_t lanes,
+                      float* const* to) {
+  const std::size_t width = hn::Lanes(FloatTag());
+  for (std::size_t lane = 0; lane < lanes; lane += width) {
+    const std::size_t left = lanes - lane;
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      ScatterQuats(LoadQuat(rotations + j * 4 * kBlock + lane), left,
+                   [&](std::size_t i) HWY_ATTR { return to[lane + i] + 4 * j; });
+    }
+  }
+}
+
 void PrepareDifferences(const float* difference, std::size_t joint_count, std::size_t lanes,
                         float* ease) {
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {

@@ -22,6 +22,16 @@ void SoaPose::Get(std::size_t lane, PoseSpan pose) const {
   }
 }
 
+void SoaPose::GetFirst(std::span<Vec3* const> roots_m, std::span<Quat* const> rotations) const {
+  STRIDEWIRE_CHECK(rotations.size() <= kLanes && roots_m.size() == rotations.size());
+  std::array<float*, kLanes> to;
+  for (std::size_t lane = 0; lane < rotations.size(); ++lane) {
+    *roots_m[lane] = root_m(lane);
+    to[lane] = &rotations[lane]->x;
+  }
+  kernels::ScatterRotations(this->rotations(), joint_count(), rotations.size(), to.data());
+}
+
 void SoaPose::Set(std::size_t lane, ConstPoseSpan pose) {
   for (int c = 0; c < 3; ++c) {
     numbers_[static_cast<std::size_t>(c)].of[lane] = pose.root_position_m[c];

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "stridewire/runtime/pose.h"
@@ -27,6 +28,8 @@ class SoaPose {
   }
   /// Copies the pose of one lane. `pose` has joint_count() rotations.
   void Get(std::size_t lane, PoseSpan pose) const;
+  /// Copies the poses of the first lanes, one per element of `roots_m` and `rotations`.
+  void GetFirst(std::span<Vec3* const> roots_m, std::span<Quat* const> rotations) const;
   void Set(std::size_t lane, ConstPoseSpan pose);
 
  private:
