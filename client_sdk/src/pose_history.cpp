@@ -10,9 +10,7 @@ namespace stridewire::client {
 
 PoseHistory::PoseHistory(std::size_t capacity, std::size_t joint_count)
     : joint_count_(joint_count),
-      stamps_(capacity),
-      slope_is_before_(capacity),
-      roots_m_(capacity),
+      entries_(capacity),
       rotations_(capacity * joint_count, kIdentityQuat) {
   correction_.rotations.resize(joint_count, kIdentityQuat);
   displayed_.resize(joint_count, kIdentityQuat);
@@ -21,7 +19,7 @@ PoseHistory::PoseHistory(std::size_t capacity, std::size_t joint_count)
 
 std::size_t PoseHistory::Bytes(std::size_t capacity, std::size_t joint_count) {
   return sizeof(PoseHistory) + 2 * joint_count * sizeof(Quat) +
-         capacity * (sizeof(PoseStamp) + 1 + sizeof(Vec3) + joint_count * sizeof(Quat));
+         capacity * (sizeof(Entry) + joint_count * sizeof(Quat));
 }
 
 bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
@@ -44,17 +42,15 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
       }
     }
     const bool has_begun = size_ > 1 && displayed_s_ > this->stamp(size_ - 2).time_s;
-    slope_is_before_[Slot(size_ - 1)] = has_begun ? 1 : 0;
+    entries_[Slot(size_ - 1)].slope_is_before = has_begun;
   }
-  if (size_ == stamps_.size()) {
-    first_ = (first_ + 1) % stamps_.size();
+  if (size_ == entries_.size()) {
+    first_ = (first_ + 1) % entries_.size();
     --size_;
   }
-  STRIDEWIRE_CHECK(size_ < stamps_.size() && rotations.size() == joint_count_);
+  STRIDEWIRE_CHECK(size_ < entries_.size() && rotations.size() == joint_count_);
   const std::size_t slot = Slot(size_++);
-  stamps_[slot] = stamp;
-  slope_is_before_[slot] = 0;
-  roots_m_[slot] = root_position_m;
+  entries_[slot] = {.stamp = stamp, .root_position_m = root_position_m};
   std::ranges::copy(rotations,
                     rotations_.begin() + static_cast<std::ptrdiff_t>(slot * joint_count_));
   return true;
@@ -95,7 +91,7 @@ std::size_t PoseHistory::FirstAfterTime(double time_s) const {
 void PoseHistory::Prefetch(double time_s, bool is_near) const {
   if (size_ == 0) return;
   if (!is_near) {
-    PrefetchBytes(&stamps_[Slot(size_ - 1)], sizeof(PoseStamp));
+    PrefetchBytes(&entries_[Slot(size_ - 1)], sizeof(Entry));
     return;
   }
   const std::size_t after = FirstAfterTime(time_s);
@@ -108,11 +104,9 @@ void PoseHistory::Prefetch(double time_s, bool is_near) const {
 
 void PoseHistory::PrefetchPush() const {
   if (size_ == 0) return;
-  const std::size_t slot = Slot(size_ == stamps_.size() ? 0 : size_);
-  PrefetchBytes(&stamps_[Slot(size_ - 1)], sizeof(PoseStamp));
-  PrefetchBytes(&stamps_[slot], sizeof(PoseStamp));
-  PrefetchBytes(&slope_is_before_[slot], 1);
-  PrefetchBytes(&roots_m_[slot], sizeof(Vec3));
+  const std::size_t slot = Slot(size_ == entries_.size() ? 0 : size_);
+  PrefetchBytes(&entries_[Slot(size_ - 1)], sizeof(Entry));
+  PrefetchBytes(&entries_[slot], sizeof(Entry));
   PrefetchBytes(&rotations_[slot * joint_count_], joint_count_ * sizeof(Quat));
 }
 
@@ -272,7 +266,7 @@ std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3
   // If a neighbour is missing, i or j replaces it, which results in the secant of the interval.
   const std::size_t before = i > 0 && !stamp(i).discontinuity ? i - 1 : i;
   const bool has_beyond =
-      j + 1 < size_ && !stamp(j + 1).discontinuity && slope_is_before_[Slot(j)] == 0;
+      j + 1 < size_ && !stamp(j + 1).discontinuity && !entries_[Slot(j)].slope_is_before;
   const std::size_t beyond = has_beyond ? j + 1 : j;
   const auto pose = [this](std::size_t k) {
     return ConstPoseSpan{this->root_position_m(k), this->rotations(k)};
@@ -283,7 +277,7 @@ std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3
        .start = pose(i),
        .end = pose(j),
        .beyond = pose(beyond),
-       .start_slope_is_before = slope_is_before_[Slot(i)] != 0},
+       .start_slope_is_before = entries_[Slot(i)].slope_is_before},
       time_s, root_position_m, rotations);
   return Sampled{i, true};
 }

@@ -62,8 +62,10 @@ class PoseHistory {
 
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t joint_count() const { return joint_count_; }
-  [[nodiscard]] const PoseStamp& stamp(std::size_t i) const { return stamps_[Slot(i)]; }
-  [[nodiscard]] const Vec3& root_position_m(std::size_t i) const { return roots_m_[Slot(i)]; }
+  [[nodiscard]] const PoseStamp& stamp(std::size_t i) const { return entries_[Slot(i)].stamp; }
+  [[nodiscard]] const Vec3& root_position_m(std::size_t i) const {
+    return entries_[Slot(i)].root_position_m;
+  }
   [[nodiscard]] std::span<const Quat> rotations(std::size_t i) const {
     return std::span(rotations_).subspan(Slot(i) * joint_count_, joint_count_);
   }
@@ -82,7 +84,9 @@ class PoseHistory {
   [[nodiscard]] bool IsInterrupted() const;
 
   /// Changes the segment of a stored pose.
-  void SetSegment(std::size_t i, std::uint32_t segment) { stamps_[Slot(i)].segment = segment; }
+  void SetSegment(std::size_t i, std::uint32_t segment) {
+    entries_[Slot(i)].stamp.segment = segment;
+  }
 
   /// Describes how Sample computed a pose.
   struct Sampled {
@@ -108,7 +112,7 @@ class PoseHistory {
  private:
   [[nodiscard]] std::size_t Slot(std::size_t i) const {
     const std::size_t slot = first_ + i;
-    return slot < stamps_.size() ? slot : slot - stamps_.size();
+    return slot < entries_.size() ? slot : slot - entries_.size();
   }
   /// Returns the index of the oldest pose after `time_s`, or size().
   [[nodiscard]] std::size_t FirstAfterTime(double time_s) const;
@@ -122,6 +126,14 @@ class PoseHistory {
   void ResolveCorrection();
 
   static constexpr double kNever = -std::numeric_limits<double>::infinity();
+
+  /// Everything about a pose except its rotations, in one cache line.
+  struct alignas(64) Entry {
+    PoseStamp stamp;
+    Vec3 root_position_m = Vec3(0.0f);
+    bool slope_is_before = false;  ///< The slope at the pose is that of the interval before it.
+  };
+  static_assert(sizeof(Entry) == 64);
 
   /// A displayed pose that is not on the curve.
   struct Correction {
@@ -139,10 +151,7 @@ class PoseHistory {
   std::size_t joint_count_;
   std::size_t first_ = 0;
   std::size_t size_ = 0;
-  std::vector<PoseStamp> stamps_;
-  /// 1: the slope at the pose is that of the interval before it.
-  std::vector<std::uint8_t> slope_is_before_;
-  std::vector<Vec3> roots_m_;
+  std::vector<Entry> entries_;
   std::vector<Quat> rotations_;
   double displayed_s_ = kNever;  ///< Time of the last Display.
   Correction correction_;
