@@ -22,12 +22,11 @@ void CopyVector(const DVec3& v, double (&out)[3]) {
   out[2] = v.z;
 }
 
-stridewire_parameters ToParameters(const protocol::ParameterSet& set) {
+stridewire_parameters ToParameters(std::span<const protocol::ParameterValue> parameters) {
   stridewire_parameters out{};
-  out.count = set.count;
-  for (std::size_t i = 0; i < set.count; ++i) {
-    out.names[i] = set.names[i];
-    out.values[i] = set.values[i];
+  for (const auto& [value, name] : parameters) {
+    out.names[out.count] = name;
+    out.values[out.count++] = value;
   }
   return out;
 }

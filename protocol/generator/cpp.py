@@ -79,34 +79,51 @@ class Cpp:
 
     # ---- checks
 
+    def that(self, condition, at, text, code="OutOfRange", value=None):
+        """A check of one value. `value` is an integer for the error."""
+        if value is None:
+            return f'found.That({condition}, ErrorCode::k{code}, "{text}", {at});'
+        code = "" if code == "OutOfRange" else f", ErrorCode::k{code}"
+        return f'found.That({condition}, {at}, {value}, "{text}"{code});'
+
+    def known(self, value, last, at):
+        """A check that a number belongs to an enum."""
+        return self.that(f"static_cast<unsigned>({value}) <= {last}", at,
+                         f"expected a number from 0 to {last}", "Malformed",
+                         f"static_cast<int>({value})")
+
     def number_check(self, f, value):
         at = self.at(f)
         if f.type in self.schema.enums:
             last = f.get("max") or list(self.schema.enums[f.type].values)[-1]
-            number = self.schema.enums[f.type].values[last]
-            return f'found.Known({value}, {number}, {at}, "expected a number from 0 to {number}");'
+            return self.known(value, self.schema.enums[f.type].values[last], at)
         if "nonzero" in f:
-            return f"found.NonZero({value}, {at});"
+            return self.that(f"{value} != 0", at, "expected a number other than 0")
         above, below, low, high = (
             value if value and self.schema.is_constant(value) else None
             for value in (f.get(name) for name in ("above", "below", "min", "max")))
         if self.is_float(f):
+            condition, text = f"std::isfinite({value})", "expected a finite number"
             if above is not None:
-                return f'found.Above({value}, {above}, {at}, "expected a number above {above}");'
-            if low is not None:
-                expected = f"expected a number of at least {low}"
-                return f'found.AtLeast({value}, {low}, {at}, "{expected}");'
-            return f"found.Finite({value}, {at});"
+                condition += f" && {value} > {above}"
+                text = f"expected a number above {above}"
+            elif low is not None:
+                condition += f" && {value} >= {low}"
+                text = f"expected a number of at least {low}"
+            return self.that(condition, at, text)
         if low is not None and high is not None:
-            expected = f"expected {self.text_of(low)} to {self.text_of(high)}"
-            return (f'found.That({value} >= {self.bound(low)} && {value} <= {self.bound(high)}, '
-                    f'{at}, {value}, "{expected}");')
+            return self.that(f"{value} >= {self.bound(low)} && {value} <= {self.bound(high)}", at,
+                             f"expected {self.text_of(low)} to {self.text_of(high)}", value=value)
         for value_of, sign, words in ((low, ">=", "at least"), (high, "<=", "at most"),
                                       (below, "<", "a number below")):
             if value_of is not None:
-                return (f'found.That({value} {sign} {self.bound(value_of)}, {at}, {value}, '
-                        f'"expected {words} {self.text_of(value_of)}");')
+                return self.that(f"{value} {sign} {self.bound(value_of)}", at,
+                                 f"expected {words} {self.text_of(value_of)}", value=value)
         return None
+
+    def entries_check(self, f, condition, text, code="OutOfRange"):
+        return (f'found.Entries({self.member(f)}, [](auto entry) {{ return {condition}; }}, '
+                f'ErrorCode::k{code}, "{text}", {self.at(f)});')
 
     def check(self, f):
         m, at = self.member(f), self.at(f)
@@ -115,13 +132,14 @@ class Cpp:
                 return [f"CheckList(found, {m}, {self.bounds(f)}, {at});"]
             lines = [f"found.Count({m}.size(), {self.bounds(f)}, {at});"]
             if self.is_float(f):
-                lines.append(f"found.FiniteEntries({m}, {at});")
+                lines.append(self.entries_check(f, "std::isfinite(entry)",
+                                                "expected a finite number"))
             if "nonzero" in f:
-                lines.append(f"found.NonZeroEntries({m}, {at});")
+                lines.append(self.entries_check(f, "entry != 0", "expected a number other than 0"))
             if enum := f.get("enumerators"):
                 last = len(self.schema.enums[enum].values) - 1
-                expected = f"expected numbers from 0 to {last}"
-                lines.append(f'found.KnownEntries({m}, {last}, {at}, "{expected}");')
+                lines.append(self.entries_check(f, f"static_cast<unsigned>(entry) <= {last}",
+                                                f"expected numbers from 0 to {last}", "Malformed"))
             return lines
         if f.type == "string":
             return [f"found.Text({m}, {self.bounds(f)}, {at});"]
@@ -164,7 +182,8 @@ class Cpp:
         lines = [self.used_if(f, "m.{}") + line for f in fields for line in self.check(f)]
         lines += [line for f in fields for line in self.relations(f, table)]
         if "native" in table:
-            lines = [f"found.AreFinite(at, {', '.join(self.member(f) for f in fields)});"]
+            finite = " && ".join(f"std::isfinite({self.member(f)})" for f in fields)
+            lines = [self.that(finite, "at", "expected a finite number")]
         if "variant" in table:
             lines.append("std::visit([&](const auto& used) { CheckFields(found, at, used); }, "
                          f"{self.variant(table)});")
@@ -225,8 +244,7 @@ class Cpp:
                          f"{self.variant(table)}.emplace<{alternative.name}>());")
         last = len(cases) - 1
         lines = self.unpack_lines(table) + ["switch (w.type()) {", *cases, "}"]
-        lines.append(f'u.Known(w.type(), {last}, At(at, "type"), '
-                     f'"expected a number from 0 to {last}");')
+        lines.append(self.known("w.type()", last, 'At(at, "type")').replace("found.", "u."))
         return functions + [self.unpack_function(table, lines)]
 
     # ---- encoding
@@ -258,7 +276,9 @@ class Cpp:
             kind = "StructList" if f.type in self.schema.tables else "ScalarList"
             return f"const auto {f.name} = {kind}(b, {m}, {keep});"
         if f.type == "string":
-            return f"const auto {f.name} = {'SharedText' if 'shared' in f else 'Text'}(b, {m});"
+            create = "CreateSharedString" if "shared" in f else "CreateString"
+            return (f"const auto {f.name} = {m}.empty() ? Offset<flatbuffers::String>() "
+                    f": b.{create}({m});")
         if f.type in self.schema.tables:
             if self.schema.is_struct(f.type):
                 return f"const wire::{f.type} {f.name} = ToWire({m});"
@@ -274,7 +294,7 @@ class Cpp:
             return f.name
         if self.schema.is_struct(f.type):
             if "omit_zero" in f:
-                return f"IsZero({self.member(f)}) ? nullptr : &{f.name}"
+                return f"{self.member(f)} == {self.type_name(f.type)}(0.0) ? nullptr : &{f.name}"
             return f"&{f.name}"
         return f.name if f.type in self.schema.tables else self.wire_scalar(f)
 
@@ -386,7 +406,7 @@ class Cpp:
             name = "StatusCode" if "status" in f else "std::byte"
         else:
             name = CPP_TYPES[f.type]
-        if f.is_list and name != "ParameterSet":
+        if f.is_list:
             return f"std::span<const {name}>" if "borrowed" in f else f"std::vector<{name}>"
         is_optional = f.default == "null" or "optional" in f
         return f"std::optional<{name}>" if is_optional else name
@@ -523,8 +543,6 @@ class Cpp:
     def codec_header(self):
         lines = []
         for t in self.schema.tables.values():
-            if t.by_hand("encode"):
-                continue
             name = self.type_name(t.name)
             for alternative in self.schema.alternatives(t) if "variant" in t else []:
                 lines.append("void CheckFields(Findings& found, const FieldPath& at, "
@@ -540,15 +558,11 @@ class Cpp:
     def codec_source(self):
         parts = []
         for t in self.schema.tables.values():
-            if t.by_hand("encode"):
-                continue
             if "variant" in t:
                 parts += [self.check_function(each) for each in self.schema.alternatives(t)]
             if not t.by_hand("check"):
                 parts.append(self.check_function(t))
-            if not t.by_hand("decode"):
-                parts += self.unpack_functions(t)
-            if not t.by_hand("encode"):
-                parts.append(self.to_wire_function(t) if t.is_struct else self.build_function(t))
+            parts += self.unpack_functions(t)
+            parts.append(self.to_wire_function(t) if t.is_struct else self.build_function(t))
         return (self.head() + '#include "codec_support.h"\n\nnamespace stridewire::protocol {\n\n' +
                 "\n".join(parts) + "\n}  // namespace stridewire::protocol\n")

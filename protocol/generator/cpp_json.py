@@ -35,7 +35,9 @@ class CppJson(Cpp):
         lines = ["Json json = Json::object();"]
         for f in self.ordered(table):
             condition = self.used_if(f, "m.{}") + self.condition(f)
-            if "variant" in table and f.name == "type":
+            if "borrowed" in f:  # The poses of a batch are decoded, and contain the other lists.
+                lines += ['json["poses"] = PosesOf(m);'] if f.name == "poses" else []
+            elif "variant" in table and f.name == "type":
                 lines.append(f'json["type"] = {self.variant(table)}.index();')
             elif f.get("json_array"):
                 lines.append(f'json["{f.get("json_array")}"].push_back({self.value(f)});')
@@ -62,7 +64,9 @@ class CppJson(Cpp):
         arrays = {}
         lines = []
         for f in fields:
-            if name := f.get("json_array"):
+            if "borrowed" in f:
+                lines += ["ReadPoses(json, m);"] if f.name == "poses" else []
+            elif name := f.get("json_array"):
                 position = arrays[name] = arrays.get(name, -1) + 1
                 lines.append(f'FromJson(json.at("{name}").at({position}), {self.member(f)});')
             else:
@@ -85,8 +89,7 @@ class CppJson(Cpp):
 
     @property
     def arrays(self):
-        return [t for t in self.schema.tables.values()
-                if "native" in t and not t.by_hand("json")]
+        return [t for t in self.schema.tables.values() if "native" in t]
 
     def is_alone(self, table):
         return self.member(table.fields[0]) == "m"
@@ -111,6 +114,6 @@ class CppJson(Cpp):
         functions = "".join(self.function(signature, lines) + "\n" for t in self.arrays
                             for signature, lines in self.array_functions(t).items())
         functions += "\n".join(self.json_function(t) + "\n" + self.parse_function(t)
-                              for t in self.objects if not t.by_hand("json"))
+                              for t in self.objects)
         return (self.head() + '#include "json_support.h"\n\nnamespace stridewire::protocol {\n\n' +
                 functions + "\n}  // namespace stridewire::protocol\n")

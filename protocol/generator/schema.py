@@ -13,7 +13,7 @@ SCALARS = {"bool": 1, "byte": 1, "ubyte": 1, "short": 2, "ushort": 2, "int": 4, 
 
 TABLE_ATTRIBUTES = {
     "bulk", "cpp", "handwritten", "in_order", "meaning", "message", "native", "reversed", "sender",
-    "variant",
+    "variant", "web",
 }
 FIELD_ATTRIBUTES = {
     "above", "below", "borrowed", "bytes", "cpp", "deprecated", "early", "enumerators", "group",

@@ -38,8 +38,8 @@ class TypeScript:
 
     def type_of(self, f):
         table = self.schema.tables.get(f.type)
-        if table is not None and table.get("native") == "ParameterSet":
-            return "Parameters"
+        if table is not None and "web" in table:
+            return table.get("web")
         if table is not None and self.is_tuple(table):
             name = f"readonly [{', '.join(['number'] * len(table.fields))}]"
         elif table is not None:
@@ -83,7 +83,7 @@ class TypeScript:
                         for name in self.schema.enums)
         interfaces = "\n".join(
             self.interface(t) for t in self.schema.tables.values()
-            if not self.is_tuple(t) and t.get("native") is None and not self.only_member(t))
+            if not self.is_tuple(t) and "web" not in t and not self.only_member(t))
         sent = {side: " |\n    ".join(m.get("cpp", m.name) for m in self.schema.messages
                                       if m.get("sender") in (side, "both"))
                 for side in ("client", "server")}

@@ -21,7 +21,7 @@ class TypeScriptCodec(TypeScript):
         return self.schema.tables.get(f.type)
 
     def is_parameters(self, f):
-        return self.table_of(f) is not None and self.table_of(f).get("native") == "ParameterSet"
+        return self.table_of(f) is not None and "web" in self.table_of(f)
 
     def function(self, signature, lines):
         return f"{signature} {{\n" + "".join(f"  {line}\n" for line in lines) + "}\n"
@@ -97,7 +97,7 @@ class TypeScriptCodec(TypeScript):
         if self.only_member(table):
             result = self.type_of(self.only_member(table))
             lines = [f"return {self.read(table.fields[0])};"]
-        elif table.get("native") == "ParameterSet":
+        elif "web" in table:
             result = "[ParameterName, number]"
             lines = ["return [parameterNames[w.name()]!, w.value()];"]
         elif self.is_tuple(table):
@@ -232,7 +232,7 @@ class TypeScriptCodec(TypeScript):
     def arguments_function(self, table):
         """Checks the members of a struct and returns the arguments of flatc's function."""
         lines = []
-        if table.get("native") == "ParameterSet":
+        if "web" in table:
             return ""
         if self.is_tuple(table):
             count = len(table.fields)
@@ -262,7 +262,7 @@ class TypeScriptCodec(TypeScript):
                       for t in tables]
         names = ", ".join(sorted(
             self.interface_name(t) for t in tables
-            if not self.is_tuple(t) and t.get("native") is None and not self.only_member(t)))
+            if not self.is_tuple(t) and "web" not in t and not self.only_member(t)))
         readers = "".join(f"  {m.name}: (bytes: ByteBuffer) => "
                           f"read{m.name}(wire.{m.name}.getRootAs{m.name}(bytes)),\n"
                           for m in self.schema.messages)
@@ -324,7 +324,7 @@ class TypeScriptCodec(TypeScript):
 
     def json(self):
         tables = [t for t in self.schema.tables.values()
-                  if not self.is_tuple(t) and t.get("native") is None and not self.only_member(t)]
+                  if not self.is_tuple(t) and "web" not in t and not self.only_member(t)]
         names = ", ".join(sorted(self.interface_name(t) for t in tables))
         functions = "\n".join(self.function(
             f"function json{t.name}(m: {self.interface_name(t)}): Json",

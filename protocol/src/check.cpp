@@ -1,6 +1,7 @@
 #include "stridewire/protocol/check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 #include <vector>
 
@@ -11,16 +12,36 @@
 /// Rules between fields, which the schema's attributes cannot express. These checks run only if the
 /// generated checks of all single fields have succeeded.
 namespace stridewire::protocol {
+
+void Findings::Wrong(ErrorCode code, const char* text, const FieldPath& at, std::int64_t value) {
+  if (error_) return;
+  error_ = Error{code, text, value, {}};
+  for (const FieldPath* path = &at; path != nullptr; path = path->parent) {
+    error_->where = std::string(path->name) + (error_->where.empty() ? "" : "." + error_->where);
+    if (path->index >= 0) error_->index = path->index;
+  }
+}
+
 namespace {
+
+/// Checks the name of a parameter. `seen` has a bit for each previous name.
+void CheckName(Findings& found, const FieldPath& at, std::uint8_t name, unsigned& seen) {
+  found.That(name < kParameterNames, at, name, "expected a parameter name from 0 to 8",
+             ErrorCode::kMalformed);
+  const unsigned bit = 1u << (name % kParameterNames);
+  found.That((seen & bit) == 0, at, name, "a parameter occurs twice", ErrorCode::kMalformed);
+  seen |= bit;
+}
 
 void CheckRings(Findings& found, const FieldPath& at, const Observe& m) {
   const Region& region = *m.region;
   const FieldPath rings = At(at, "rings");
   double before_m = 0.0;
   for (std::size_t i = 0; i < region.rings.size(); ++i) {
-    found.Above(region.rings[i].to_m, before_m, At(Entry(rings, i), "to_m"),
-                "expected a radius above that of the previous ring");
-    before_m = region.rings[i].to_m;
+    const double to_m = region.rings[i].to_m;
+    found.That(std::isfinite(to_m) && to_m > before_m, ErrorCode::kOutOfRange,
+               "expected a radius above that of the previous ring", At(Entry(rings, i), "to_m"));
+    before_m = to_m;
   }
   const std::size_t details = region.ring_details.size();
   if (details == 0) return;
@@ -31,6 +52,17 @@ void CheckRings(Findings& found, const FieldPath& at, const Observe& m) {
 }
 
 }  // namespace
+
+void CheckList(Findings& found, const std::vector<ParameterValue>& list, const Bounds& bounds,
+               const FieldPath& at) {
+  found.Count(list.size(), bounds, at);
+  unsigned seen = 0;
+  for (const ParameterValue& parameter : list) {
+    CheckName(found, at, parameter.name, seen);
+    found.That(std::isfinite(parameter.value), ErrorCode::kOutOfRange, "expected a finite number",
+               at);
+  }
+}
 
 void CheckMeaning(Findings& found, const FieldPath& at, const Observe& m) {
   found.That(m.detail == PoseDetail::kAll || m.mode == PoseMode::kQuantised,
@@ -45,7 +77,6 @@ void CheckMeaning(Findings& found, const FieldPath& at, const Observe& m) {
 void CheckMeaning(Findings& found, const FieldPath& at, const HeightFieldInfo& m) {
   found.That(m.heights_m.size() == std::size_t{m.columns} * m.rows, At(at, "heights_m"),
              m.heights_m.size(), "expected columns * rows heights", ErrorCode::kShapeMismatch);
-  found.FiniteEntries(m.heights_m, At(at, "heights_m"));
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const TerrainBoxInfo& m) {
@@ -144,12 +175,7 @@ void CheckMeaning(Findings& found, const FieldPath& at, const CurrentMovement& m
              "expected a time between 0 and the last keytime", At(at, "generic_time"));
   unsigned seen = 0;
   for (const std::uint8_t name : m.parameter_names) {
-    const FieldPath names = At(at, "parameter_names");
-    found.Known(name, kParameterNames - 1, names, "expected a parameter name from 0 to 8");
-    if (!found.ok()) return;
-    found.That((seen & (1u << name)) == 0, names, name, "a parameter occurs twice",
-               ErrorCode::kMalformed);
-    seen |= 1u << name;
+    CheckName(found, At(at, "parameter_names"), name, seen);
   }
   found.That(m.sites.empty() || m.sites.size() == m.weights.size() * m.parameter_names.size(),
              At(at, "sites"), m.sites.size(), "expected one row of parameters per weight",

@@ -25,9 +25,8 @@ using flatbuffers::Offset;
 /// name the cases; protocol/generator/README.md explains them.
 namespace stridewire::protocol {
 
-inline bool IsZero(const DVec3& v) { return v == DVec3(0.0); }
-
-void CheckList(Findings& found, const ParameterSet& set, const Bounds& bounds, const FieldPath& at);
+void CheckList(Findings& found, const std::vector<ParameterValue>& list, const Bounds& bounds,
+               const FieldPath& at);
 template <typename T>
 void CheckList(Findings& found, const std::vector<T>& list, const Bounds& bounds,
                const FieldPath& at) {
@@ -35,9 +34,6 @@ void CheckList(Findings& found, const std::vector<T>& list, const Bounds& bounds
   for (std::size_t i = 0; i < list.size(); ++i) CheckFields(found, Entry(at, i), list[i]);
 }
 
-using WireParameters = flatbuffers::Vector<const wire::ParameterValue*>;
-void UnpackList(Unpacker& u, const WireParameters* list, const Bounds& bounds, const FieldPath& at,
-                ParameterSet& out);
 template <typename W, typename T>
 void UnpackList(Unpacker& u, const flatbuffers::Vector<W>* list, const Bounds& bounds,
                 const FieldPath& at, std::vector<T>& out) {
@@ -47,15 +43,7 @@ void UnpackList(Unpacker& u, const flatbuffers::Vector<W>* list, const Bounds& b
   }
 }
 
-// Empty texts and lists are omitted, unless `keep_empty` is true.
-
-inline Offset<flatbuffers::String> Text(FlatBufferBuilder& b, const std::string& text) {
-  return text.empty() ? Offset<flatbuffers::String>() : b.CreateString(text);
-}
-/// For texts that thousands of items of a message can have. Equal texts are stored once.
-inline Offset<flatbuffers::String> SharedText(FlatBufferBuilder& b, const std::string& text) {
-  return text.empty() ? Offset<flatbuffers::String>() : b.CreateSharedString(text);
-}
+// Empty lists are omitted, unless `keep_empty` is true.
 
 /// Builds a list of numbers, enums or bytes.
 auto ScalarList(FlatBufferBuilder& b, const auto& list, bool keep_empty) {
@@ -66,7 +54,6 @@ auto ScalarList(FlatBufferBuilder& b, const auto& list, bool keep_empty) {
   return b.CreateVector(reinterpret_cast<const Number*>(list.data()), list.size());
 }
 
-Offset<WireParameters> StructList(FlatBufferBuilder& b, const ParameterSet& set, bool keep_empty);
 template <typename T>
 auto StructList(FlatBufferBuilder& b, const std::vector<T>& list, bool keep_empty) {
   using Wire = decltype(ToWire(std::declval<const T&>()));

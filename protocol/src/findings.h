@@ -48,7 +48,7 @@ class Findings {
 
   [[nodiscard]] bool ok() const { return !error_; }
 
-  /// Checks an integer or a rule between fields.
+  /// Checks a value or a rule between fields.
   template <std::integral Value>
   void That(bool holds, const FieldPath& at, Value value, const char* expected,
             ErrorCode code = ErrorCode::kOutOfRange) {
@@ -56,30 +56,6 @@ class Findings {
   }
   void That(bool holds, ErrorCode code, const char* text, const FieldPath& at) {
     if (!holds) Wrong(code, text, at);
-  }
-
-  void NonZero(std::uint64_t value, const FieldPath& at) {
-    if (value == 0) Wrong(ErrorCode::kOutOfRange, "expected a number other than 0", at);
-  }
-
-  void AreFinite(const FieldPath& at, std::floating_point auto... values) {
-    if (!(std::isfinite(values) && ...)) {
-      Wrong(ErrorCode::kOutOfRange, "expected a finite number", at);
-    }
-  }
-  void Finite(double value, const FieldPath& at) { AreFinite(at, value); }
-  void Above(double value, double bound, const FieldPath& at, const char* expected) {
-    if (!(std::isfinite(value) && value > bound)) Wrong(ErrorCode::kOutOfRange, expected, at);
-  }
-  void AtLeast(double value, double bound, const FieldPath& at, const char* expected) {
-    if (!(std::isfinite(value) && value >= bound)) Wrong(ErrorCode::kOutOfRange, expected, at);
-  }
-
-  template <typename E>
-  void Known(E value, unsigned last, const FieldPath& at, const char* expected) {
-    if (static_cast<unsigned>(value) > last) {
-      Wrong(ErrorCode::kMalformed, expected, at, static_cast<std::int64_t>(value));
-    }
   }
 
   void Count(std::size_t count, const Bounds& bounds, const FieldPath& at) {
@@ -94,17 +70,12 @@ class Findings {
     Wrong(ErrorCode::kMalformed, "expected UTF-8 without control characters", at);
   }
 
-  void NonZeroEntries(const auto& list, const FieldPath& at) {
-    const auto zero = std::ranges::find(list, 0u);
-    if (zero != list.end()) NonZero(0, Entry(at, static_cast<std::size_t>(zero - list.begin())));
-  }
-  void FiniteEntries(const auto& list, const FieldPath& at) {
-    std::size_t i = 0;
-    for (const auto entry : list) Finite(entry, Entry(at, i++));
-  }
-  void KnownEntries(const auto& list, unsigned last, const FieldPath& at, const char* expected) {
-    std::size_t i = 0;
-    for (const auto entry : list) Known(entry, last, Entry(at, i++), expected);
+  /// Checks every entry of a list of numbers.
+  void Entries(const auto& list, auto holds, ErrorCode code, const char* text,
+               const FieldPath& at) {
+    const auto wrong = std::ranges::find_if_not(list, holds);
+    if (wrong == list.end()) return;
+    Wrong(code, text, Entry(at, static_cast<std::size_t>(wrong - list.begin())));
   }
 
   [[nodiscard]] Status Result() {

@@ -20,7 +20,6 @@ using Json = nlohmann::ordered_json;
 
 [[nodiscard]] inline Json Value(std::uint64_t value) { return std::to_string(value); }
 [[nodiscard]] Json Value(const std::vector<std::byte>& bytes);
-[[nodiscard]] Json Value(const ParameterSet& set);
 [[nodiscard]] inline Json Value(const std::string& text) { return text; }
 template <typename T>
   requires std::is_arithmetic_v<T>
@@ -52,7 +51,11 @@ void FromJson(const Json& json, E& out) {
 }
 inline void FromJson(const Json& json, std::string& out) { json.get_to(out); }
 void FromJson(const Json& json, std::vector<std::byte>& out);
-void FromJson(const Json& json, ParameterSet& set);
+
+/// Decodes the poses of a batch.
+[[nodiscard]] Json PosesOf(const PoseBatch& m);
+/// Encodes them. The mode and the number of joints must be set.
+void ReadPoses(const Json& json, PoseBatch& m);
 
 }  // namespace stridewire::protocol
 

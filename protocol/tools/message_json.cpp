@@ -22,31 +22,7 @@ Json Value(const std::vector<std::byte>& bytes) {
   return text;
 }
 
-Json Value(const ParameterSet& set) {
-  Json json = Json::array();
-  for (std::size_t p = 0; p < set.count; ++p) {
-    json.push_back({{"name", set.names[p]}, {"value", set.values[p]}});
-  }
-  return json;
-}
-
-namespace {
-
-/// Calls `visit` for the JSON name and the value of each field of a batch except its lists.
-void VisitInfo(auto& info, auto visit) {
-  visit("world", info.world);
-  visit("shard", info.shard);
-  visit("part", info.part);
-  visit("parts", info.parts);
-  visit("tick", info.tick);
-  visit("server_time_s", info.server_time_s);
-  visit("mode", info.mode);
-  visit("joint_count", info.joint_count);
-}
-
-}  // namespace
-
-Json Fields(const PoseBatch& m) {
+Json PosesOf(const PoseBatch& m) {
   Json poses = Json::array();
   std::vector<Quat> rotations(m.info.joint_count);
   PoseBatchReader reader(m, SampleCodecs().Find(m.info.mode));
@@ -59,11 +35,7 @@ Json Fields(const PoseBatch& m) {
                      {"root_position_m", Value(root)},
                      {"rotations", Value(rotations)}});
   }
-  Json json;
-  VisitInfo(m.info, [&](const char* name, const auto& value) { json[name] = Value(value); });
-  json["poses"] = poses;
-  if (m.info.is_partial) json["partial"] = true;
-  return json;
+  return poses;
 }
 
 void FromJson(const Json& json, std::vector<std::byte>& out) {
@@ -74,7 +46,7 @@ void FromJson(const Json& json, std::vector<std::byte>& out) {
   }
 }
 
-void FromJson(const Json& json, PoseBatch& m) {
+void ReadPoses(const Json& json, PoseBatch& m) {
   struct Arrays {
     std::vector<AvatarId> avatars;
     std::vector<std::uint8_t> flags;
@@ -83,8 +55,6 @@ void FromJson(const Json& json, PoseBatch& m) {
   // The batch borrows its arrays. They are never freed, because tests use few batches.
   static std::deque<Arrays> kept;
   auto& [avatars, flags, poses] = kept.emplace_back();
-  VisitInfo(m.info, [&](const char* name, auto& value) { Get(json, name, value); });
-  Get(json, "partial", m.info.is_partial);
   const CompactCodec* codec = SampleCodecs().Find(m.info.mode);
   for (const Json& pose : json.contains("poses") ? json["poses"] : Json()) {
     Get(pose, "avatar", avatars.emplace_back());
@@ -111,14 +81,6 @@ void FromJson(const Json& json, PoseBatch& m) {
   m.avatars = avatars;
   m.flags = flags;
   m.poses = poses;
-}
-
-void FromJson(const Json& json, ParameterSet& set) {
-  set = {};
-  for (const Json& parameter : json) {
-    Get(parameter, "name", set.names.at(set.count));
-    Get(parameter, "value", set.values.at(set.count++));
-  }
 }
 
 Json ToJson(const Message& message) {

@@ -16,17 +16,17 @@ protocol::LegInfo LegToWire(const Leg& leg) {
           .toe_tip_offset_m = leg.toe_tip_offset_m};
 }
 
-protocol::ParameterSet ParametersToWire(const ParameterValues& values, const MotionGroup& group) {
-  protocol::ParameterSet set;
+std::vector<protocol::ParameterValue> ParametersToWire(const ParameterValues& values,
+                                                       const MotionGroup& group) {
+  std::vector<protocol::ParameterValue> wire;
   const int count =
       std::min({values.count, group.parameter_count(), static_cast<int>(protocol::kMaxParameters)});
   for (int i = 0; i < count; ++i) {
     const auto p = static_cast<std::size_t>(i);
-    set.names[p] = static_cast<std::uint8_t>(group.parameters[p].name);
-    set.values[p] = values.values[p];
+    wire.push_back(
+        {.value = values.values[p], .name = static_cast<std::uint8_t>(group.parameters[p].name)});
   }
-  set.count = static_cast<std::uint8_t>(count);
-  return set;
+  return wire;
 }
 
 protocol::EventType TypeToWire(AvatarEventType type) {

@@ -244,8 +244,8 @@ TEST(ServerSession, WalksAnAvatarAndSendsItsEvents) {
                                  EventType::kStarted, EventType::kFinished));
   const auto started = std::ranges::find(events, EventType::kStarted, &protocol::Event::type);
   EXPECT_EQ(started->request_id, 1u);
-  EXPECT_GT(started->requested.count, 0);
-  EXPECT_EQ(started->requested.count, started->applied.count);
+  EXPECT_GT(started->requested.size(), 0u);
+  EXPECT_EQ(started->requested.size(), started->applied.size());
   const auto finished = std::ranges::find(events, EventType::kFinished, &protocol::Event::type);
   EXPECT_NE(finished->base.position_m, DVec3(1, 0, 2));
   EXPECT_TRUE(std::ranges::is_sorted(events, {}, &protocol::Event::tick));
@@ -285,11 +285,11 @@ TEST(ServerSession, ReportsGroupAndExtrapolation) {
   EXPECT_NE(beyond.group, inside.group);  // the other foot
   EXPECT_TRUE(beyond.extrapolated);
   EXPECT_TRUE(beyond.clamped);
-  ASSERT_EQ(beyond.requested.count, 2);
-  EXPECT_NEAR(beyond.requested.values[1], 5.0, 1e-9);
-  EXPECT_GT(beyond.applied.values[1],
+  ASSERT_EQ(beyond.requested.size(), 2u);
+  EXPECT_NEAR(beyond.requested[1].value, 5.0, 1e-9);
+  EXPECT_GT(beyond.applied[1].value,
             0.5);  // the test library has steps of 0.6 m; the hull is extended by 10 %
-  EXPECT_LT(beyond.applied.values[1], 0.66);
+  EXPECT_LT(beyond.applied[1].value, 0.66);
 }
 
 TEST(ServerSession, ChoosesUnusedAvatarIds) {

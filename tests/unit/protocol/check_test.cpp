@@ -815,27 +815,26 @@ TEST(Check, Events) {
   RefusedTexts<E>(
       good, [](E& m) -> std::string& { return m.events[1].reason; }, kMaxReasonBytes, true,
       "Events.events.reason", 1);
-  const auto parameters = [&](ParameterSet Event::* set, std::string_view field) {
+  using Parameters = std::vector<ParameterValue>;
+  const auto parameters = [&](Parameters Event::* list, std::string_view field) {
     const auto with = [&](auto change) {
       return [=](E& m) {
-        ParameterSet& values = m.events[0].*set;
-        values.count = 2;
-        values.names = {2, 5};
-        values.values = {1.0, 2.0};
+        Parameters& values = m.events[0].*list;
+        values = {{.value = 1.0, .name = 2}, {.value = 2.0, .name = 5}};
         change(values);
       };
     };
     E fine = good;
-    with([](ParameterSet&) {})(fine);
+    with([](Parameters&) {})(fine);
     EXPECT_TRUE(Check(fine));
-    Refused<E>(good, with([](ParameterSet& s) { s.count = kMaxParameters + 1; }),
+    Refused<E>(good, with([](Parameters& s) { s.resize(kMaxParameters + 1); }),
                ErrorCode::kLimitExceeded, field, 0);
-    Refused<E>(good, with([](ParameterSet& s) { s.names[1] = kParameterNames; }),
+    Refused<E>(good, with([](Parameters& s) { s[1].name = kParameterNames; }),
                ErrorCode::kMalformed, field, 0);
-    Refused<E>(good, with([](ParameterSet& s) { s.names[1] = s.names[0]; }), ErrorCode::kMalformed,
+    Refused<E>(good, with([](Parameters& s) { s[1].name = s[0].name; }), ErrorCode::kMalformed,
                field, 0);
-    Refused<E>(good, with([](ParameterSet& s) { s.values[1] = kNaN; }), ErrorCode::kOutOfRange,
-               field, 0);
+    Refused<E>(good, with([](Parameters& s) { s[1].value = kNaN; }), ErrorCode::kOutOfRange, field,
+               0);
   };
   parameters(&Event::requested, "Events.events.requested");
   parameters(&Event::applied, "Events.events.applied");

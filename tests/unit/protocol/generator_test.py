@@ -99,13 +99,17 @@ class CppTest(unittest.TestCase):
 
     def test_checks_every_field(self):
         for line in (
-                'found.NonZero(m.seq, At(at, "seq"));',
-                'found.Known(m.color, 1, At(at, "color"), "expected a number from 0 to 1");',
+                'found.That(m.seq != 0, ErrorCode::kOutOfRange, "expected a number other than 0", '
+                'At(at, "seq"));',
+                'found.That(static_cast<unsigned>(m.color) <= 1, At(at, "color"), '
+                'static_cast<int>(m.color), "expected a number from 0 to 1", '
+                'ErrorCode::kMalformed);',
                 'found.Text(m.text, {0, 16, "expected at most 16 bytes"}, At(at, "text"));',
                 'CheckList(found, m.items, {1, kMaxItems, "expected 1 to 65,536 entries"}, '
                 'At(at, "items"));',
-                'if (m.speed_m_s) found.AtLeast(*m.speed_m_s, 0, At(at, "speed_m_s"), '
-                '"expected a number of at least 0");'):
+                'if (m.speed_m_s) found.That(std::isfinite(*m.speed_m_s) && *m.speed_m_s >= 0, '
+                'ErrorCode::kOutOfRange, "expected a number of at least 0", '
+                'At(at, "speed_m_s"));'):
             self.assertIn(line, self.source)
 
     def test_checks_relations_between_fields(self):
@@ -220,7 +224,8 @@ class VariantTest(unittest.TestCase):
 
     def test_copies_only_fields_that_the_type_uses(self):
         source = Cpp(read(VARIANT)).codec_source()
-        for line in ("  if (!m.at) found.Finite(m.far, At(at, \"far\"));",
+        for line in ("  if (!m.at) found.That(std::isfinite(m.far), ErrorCode::kOutOfRange, "
+                     "\"expected a finite number\", At(at, \"far\"));",
                      "  if (!w.at()) m.far = w.far();", "  m.high = w.high();",
                      "    case wire::Kind::Run: return Unpack(u, at, w, "
                      "m.movement.emplace<RunMovement>());",

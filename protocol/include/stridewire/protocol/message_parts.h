@@ -42,13 +42,4 @@ inline constexpr std::uint8_t kPoseUncompressed = 4;
 /// record.
 inline constexpr std::uint8_t kMovementGone = 4;
 
-/// Parameters of a movement. The names are 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m,
-/// 4 end_y_m, 5 end_z_m, 6 turn_rad, 7 length_m, 8 height_m.
-struct ParameterSet {
-  std::array<std::uint8_t, kMaxParameters> names{};
-  std::array<double, kMaxParameters> values{};
-  std::uint8_t count = 0;  ///< Number of valid entries. All further entries are 0.
-  bool operator==(const ParameterSet&) const = default;
-};
-
 }  // namespace stridewire::protocol

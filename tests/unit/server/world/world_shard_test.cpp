@@ -134,7 +134,7 @@ TEST(WorldShard, InspectsAnAvatar) {
   // The weights have the sum 1, and the weighted mean of the examples equals the applied
   // parameters. This holds for a cardinal basis without pseudoexamples.
   const std::size_t d = movement.parameter_names.size();
-  ASSERT_EQ(movement.applied.count, d);
+  ASSERT_EQ(movement.applied.size(), d);
   ASSERT_EQ(movement.sites.size(), movement.weights.size() * d);
   double sum = 0.0;
   std::vector<double> mean(d);
@@ -146,8 +146,8 @@ TEST(WorldShard, InspectsAnAvatar) {
   }
   EXPECT_NEAR(sum, 1.0, 1e-5);
   for (std::size_t p = 0; p < d; ++p) {
-    EXPECT_EQ(movement.parameter_names[p], movement.applied.names[p]);
-    EXPECT_NEAR(mean[p], movement.applied.values[p], 1e-5);
+    EXPECT_EQ(movement.parameter_names[p], movement.applied[p].name);
+    EXPECT_NEAR(mean[p], movement.applied[p].value, 1e-5);
   }
 
   EXPECT_TRUE(bench.shard.Inspect(1, bench.tick, 10).movement->sites.empty());
