@@ -439,7 +439,7 @@ class Cpp:
             groups[name] = groups.get(name, 0) + 1
             if groups[name] > 1:
                 continue
-            lines += [f"  /// {line}" for line in f.doc]
+            lines += [f"  /// {line}" for line in self.schema.documentation(f)]
             if "[" in f.get("cpp", ""):
                 size = sum(other.get("cpp", "").startswith(f"{name}[") for other in table.fields)
                 lines.append(f"  std::array<{self.member_type(f)}, {size}> {name};")
@@ -464,7 +464,7 @@ class Cpp:
         """The comment of the first field describes the whole struct."""
         lines = [f"/// {line}" for line in fields[0].doc] + [f"struct {name} {{"]
         for i, f in enumerate(fields):
-            lines += [f"  /// {line}" for line in f.doc if i > 0]
+            lines += [f"  /// {line}" for line in self.schema.documentation(f) if i > 0]
             type_name = self.member_type(f)
             lines.append(f"  {type_name} {f.get('cpp')}{self.initializer(f, type_name)};")
         equal = f"bool operator==(const {name}&) const = default;"
@@ -481,9 +481,10 @@ class Cpp:
         names = ", ".join(alternative.name for alternative in self.schema.alternatives(table))
         for f in table.fields:
             if f.name == "type":
+                lines.append(f"  /// The index of the alternative is a {f.type}.")
                 lines.append(f"  std::variant<{names}> {table.get('variant')};")
             elif "only" not in f:
-                lines += [f"  /// {line}" for line in f.doc]
+                lines += [f"  /// {line}" for line in self.schema.documentation(f)]
                 type_name = self.member_type(f)
                 lines.append(f"  {type_name} {f.name}{self.initializer(f, type_name)};")
         return lines + self.struct_end(table)

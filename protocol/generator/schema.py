@@ -103,6 +103,31 @@ class Schema:
         """The value of a bound: a number, or the name of a limit."""
         return int(self.limits[value].default) if value in self.limits else float(value)
 
+    def documentation(self, f):
+        """The lines of the comment of a field, with its range at the end."""
+        def name(value):
+            if value in self.limits:
+                return "k" + "".join(word.capitalize() for word in value.split("_"))
+            return value if self.is_constant(value) else f"`{value}`"
+
+        low, high = f.get("min"), f.get("max")
+        unit = " entries" if f.is_list and "bytes" not in f else ""
+        if f.type in self.enums or "per" in f or low == "-1":
+            text = ""
+        elif low and high:
+            text = f"{name(low)} to {name(high)}{unit}."
+        elif low or high:
+            text = f"At least {name(low)}." if low else f"At most {name(high)}{unit}."
+        elif "above" in f or "below" in f:
+            text = f"Above {name(f.get('above'))}." if "above" in f else \
+                f"Below {name(f.get('below'))}."
+        else:
+            text = "Not 0." if "nonzero" in f and not f.is_list else ""
+        if not text or not f.doc:
+            return f.doc + [text] if text else f.doc
+        joined = f"{f.doc[-1]} {text}"
+        return f.doc[:-1] + [joined] if len(joined) <= 90 else f.doc + [text]
+
     def is_constant(self, value):
         """Whether a bound is a number or a limit. Otherwise it is a field of the same table."""
         return value in self.limits or bool(re.fullmatch(r"-?\d+(\.\d+)?", value))

@@ -54,33 +54,56 @@ class TypeScript:
         else:
             name = "bigint" if f.type == "ulong" and "number" not in f else "number"
         if f.is_list:
-            return f"readonly ({name})[]" if " " in name else f"{name}[]"
+            return f"readonly ({name})[]" if " " in name else f"readonly {name}[]"
         return name + (" | null" if "optional" in f or f.default == "null" else "")
 
-    def documentation(self, f):
-        """The comment of a field, with the values of limits instead of their names in C++."""
-        text = re.sub(r"\bkMax(\w+)", lambda m: str(self.limit(m[1]) or m[0]), " ".join(f.doc))
-        lines = textwrap.wrap(text, 92)
-        return f"  /** {f'{chr(10)}   * '.join(lines)} */\n" if lines else ""
+    def words(self, lines):
+        """The text of a comment, with the names of TypeScript, and the values of limits."""
+        text = re.sub(r"\bkMax(\w+)", lambda m: self.limit(m[1]) or m[0], " ".join(lines))
+        text = re.sub(r"`(\w+)`", lambda m: f"`{lower_camel(m[1])}`", text)
+        text = re.sub(r"\b(?:\w+::)?k([A-Z]\w+)", lambda m: f"`{self.value_name(m[1])}`", text)
+        return text.replace("::", ".")
+
+    def comment(self, lines, indent=""):
+        lines = textwrap.wrap(self.words(lines), 94 - len(indent))
+        return f"{indent}/** {f'{chr(10)}{indent} * '.join(lines)} */\n" if lines else ""
+
+    def value_name(self, name):
+        """The name of an enumerator, or of a status code."""
+        if any(name in enum.values for enum in self.schema.enums.values()):
+            return lower_camel(name)
+        return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
     def limit(self, name):
-        """The value of the limit that C++ calls kMaxNAME."""
+        """The value of the limit that C++ calls kMaxNAME, or None."""
         snake = re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
         limit = self.schema.limits.get(f"max_{snake}")
-        return limit and limit.default
+        return limit and limit.default + (" bytes" if name.endswith("Bytes") else "")
 
     def interface(self, table):
         tag = f"  type: '{table.name}';\n" if "message" in table else ""
-        members = "".join(f"{self.documentation(f)}  {self.name_of(f)}: {self.type_of(f)};\n"
-                          for f in table.fields)
-        return f"export interface {table.get('cpp', table.name)} {{\n{tag}{members}}}\n"
+        members = "".join(
+            f"{self.comment(self.schema.documentation(f), '  ')}"
+            f"  {self.name_of(f)}: {self.type_of(f)};\n" for f in table.fields)
+        return (f"{self.comment(table.doc)}export interface {table.get('cpp', table.name)} "
+                f"{{\n{tag}{members}}}\n")
+
+    def enum_type(self, enum):
+        """The type of an enum. The comment lists the values that have comments."""
+        comment = self.comment(enum.doc)
+        values = "".join(
+            textwrap.fill(f"`{lower_camel(value)}`: {self.words(doc)}", 95,
+                          initial_indent=" * - ", subsequent_indent=" *   ") + "\n"
+            for value, doc in enum.value_docs.items() if doc)
+        if comment and values:
+            comment = f"/**\n * {comment[4:-4]}\n{values} */\n"
+        return f"{comment}export type {enum.name} = (typeof enums.{enum.name})[number];\n"
 
     def messages(self):
         enums = "".join(
             f"  {e.name}: [{', '.join(repr(lower_camel(v)) for v in e.values)}],\n"
             for e in self.schema.enums.values())
-        types = "".join(f"export type {name} = (typeof enums.{name})[number];\n"
-                        for name in self.schema.enums)
+        types = "".join(self.enum_type(e) for e in self.schema.enums.values())
         interfaces = "\n".join(
             self.interface(t) for t in self.schema.tables.values()
             if not self.is_tuple(t) and "web" not in t and not self.only_member(t))

@@ -26,7 +26,11 @@ enum Color: ubyte { Red = 0,
   /// Not blue.
   Green = 1 }
 struct Point { x: double; z: float; }
-table Item { avatar: uint (nonzero); speed_m_s: double = null (min: "0"); }
+table Item {
+  avatar: uint (nonzero);
+  /// Walking speed.
+  speed_m_s: double = null (min: "0");
+}
 // A comment; with a semicolon.
 table Paint (message: "7", sender: "client", bulk) {
   seq: ulong (nonzero);
@@ -112,6 +116,13 @@ class CppTest(unittest.TestCase):
                 'At(at, "speed_m_s"));'):
             self.assertIn(line, self.source)
 
+    def test_comments_state_ranges(self):
+        header = self.cpp.structs_header()
+        for line in ("  /// Not 0.\n  Seq seq = 0;\n", "  /// At most 16.\n  std::string text;\n",
+                     "  /// 1 to kMaxItems entries.\n  std::vector<Item> items;\n",
+                     "  /// Walking speed. At least 0.\n  std::optional<double> speed_m_s;\n"):
+            self.assertIn(line, header)
+
     def test_checks_relations_between_fields(self):
         source = Cpp(read("""table Batch {
           part: ushort (below: "parts");
@@ -151,8 +162,8 @@ class CppTest(unittest.TestCase):
 
     def test_writes_structs(self):
         header = self.cpp.structs_header()
-        for line in ("struct Item {\n  AvatarId avatar = 0;\n  std::optional<double> speed_m_s;",
-                     "  static constexpr MessageType kType = MessageType::kPaint;\n  Seq seq = 0;",
+        for line in ("  AvatarId avatar = 0;\n", "  std::optional<double> speed_m_s;",
+                     "  static constexpr MessageType kType = MessageType::kPaint;\n", "  Seq seq = 0;",
                      "  Color color = Color::kRed;", "  std::vector<Item> items;",
                      "  bool visible = true;", "using Message = std::variant<Paint>;"):
             self.assertIn(line, header)
@@ -162,7 +173,8 @@ class CppTest(unittest.TestCase):
           ids: [uint] (borrowed, keep_empty, max: "4");
           bytes: [ubyte] (bytes, keep_empty: "ids", max: "9");
         }"""))
-        self.assertIn("std::span<const std::uint32_t> ids;\n  std::vector<std::byte> bytes;\n};",
+        self.assertIn("std::span<const std::uint32_t> ids;\n  /// At most 9.\n"
+                      "  std::vector<std::byte> bytes;\n};",
                       cpp.structs_header())
         self.assertIn("u.Borrow(w.ids(), {0, 4, ", cpp.codec_source())
         self.assertIn("const auto bytes = ScalarList(b, m.bytes, !m.ids.empty());\n"
@@ -219,7 +231,8 @@ class VariantTest(unittest.TestCase):
                       "  bool high = false;\n", header)
         self.assertIn("struct RunMovement {\n  double far = 0.0;\n  std::optional<DVec3> at;\n"
                       "  double seconds = 0.0;\n", header)
-        self.assertIn("struct Item {\n  std::uint32_t id = 0;\n"
+        self.assertIn("struct Item {\n  /// Not 0.\n  std::uint32_t id = 0;\n"
+                      "  /// The index of the alternative is a Kind.\n"
                       "  std::variant<HopMovement, RunMovement> movement;\n", header)
 
     def test_copies_only_fields_that_the_type_uses(self):
@@ -263,7 +276,9 @@ class TypeScriptTest(unittest.TestCase):
     def test_writes_interfaces_with_the_names_of_cpp(self):
         messages = self.web.messages()
         for line in ("Color: ['red', 'green'],", "speedMS: number | null;", "visible: boolean;",
-                     "color: Color;", "place: readonly [number, number];", "Paint: 7,"):
+                     "color: Color;", "place: readonly [number, number];", "Paint: 7,",
+                     "  /** 1 to 65536 entries. */\n  items: readonly Item[];\n",
+                     "/**\n * Color of paint.\n * - `green`: Not blue.\n */\nexport type Color"):
             self.assertIn(line, messages)
         self.assertNotIn("old", messages)
 
