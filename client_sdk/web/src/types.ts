@@ -6,11 +6,12 @@
  * right-handed with +Y up. Heading 0 faces +Z, and turning left is positive. Quaternions have unit
  * length and are stored as x, y, z, w.
  */
-import type {RequestItem} from '../generated/messages';
+import type * as messages from '../generated/messages';
+import type {Foot, MovementType, RequestItem, Role} from '../generated/messages';
 
-/** A `controller` may send commands and receives all events of the world. An `observer` may only
- * observe. */
-export type Role = 'controller' | 'observer';
+export type {
+  Foot, Interrupt, MovementKind, MovementType, RequestOutcome, Role
+} from '../generated/messages';
 /**
  * Precision of received poses.
  * - `full`: float32 values, exactly as the server computed them.
@@ -32,33 +33,10 @@ export type PoseMode = 'full' | 'quantised' | 'movement';
  * joint.
  */
 export type PoseDetail = 'all' | 'reduced' | 'root';
-/** Type of a requested movement. A walk is carried out as a series of steps. */
-export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
-/** Kind of a movement that an avatar carries out. */
-export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
-/**
- * Determines when a requested movement starts.
- * - `none`: after all queued movements.
- * - `afterMovement`: after the current movement. Clears the queue and ends a stand or walk.
- * - `now`: as soon as the feet allow it. Clears the queue and ends a stand or walk.
- */
-export type Interrupt = 'none' | 'afterMovement' | 'now';
-export type Foot = 'left' | 'right';
 /** `entered` and `left` occur only if a region is observed. They report that an avatar entered the
  * region, or left the region or the world. */
 export type WorldEventType = 'accepted' | 'started' | 'footStrike' | 'finished' | 'idle' |
     'rejected' | 'spawned' | 'removed' | 'entered' | 'left';
-/**
- * How a request ended.
- * - `none`: the event does not end a request.
- * - `completed`: finished; the movement was played to its end, or the walk has arrived.
- * - `rejected`: rejected; the avatar could not execute the request.
- * - `cancelled`: rejected; `World.cancel` or a teleport dropped it.
- * - `replaced`: rejected or finished; another request dropped it, or cut its movement short.
- * - `removed`: rejected; the avatar was removed.
- */
-export type RequestOutcome =
-    'none' | 'completed' | 'rejected' | 'cancelled' | 'replaced' | 'removed';
 export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | 'endZ' | 'turn' |
     'length' | 'height';
 /**
@@ -73,6 +51,8 @@ export type WorldState = 'pending' | 'joining' | 'joined' | 'refused' | 'left';
 export type Vec3 = readonly [number, number, number];
 /** Fields that may be absent. */
 type Given<T> = {[name in keyof T]?: NonNullable<T[name]>};
+/** The fields `K` may be absent. */
+type Optional<T, K extends keyof T> = Omit<T, K> & {[name in K]?: T[name]};
 
 /**
  * Parameters of a movement: `turn` in radians, all others in metres. Positions and distances are
@@ -103,32 +83,13 @@ export interface Reply {
 }
 
 /** Result of one item of a command. */
-export interface ReplyItem {
-  /** Position of the item in the command's list, from 0. */
-  readonly index: number;
-  /** Id of the avatar. For a spawn without an id this is the id chosen by the server. */
-  readonly avatar: number;
-  /** Id of the movement request; 0n for other items. */
-  readonly requestId: bigint;
-  /** Result of the item, one of `Status`; 0 if the item succeeded. */
-  readonly code: number;
+export interface ReplyItem extends Readonly<messages.ReplyItem> {
+  /** Name of the code. */
   readonly status: string;
-  readonly text: string;
 }
 
 /** Grid of ground heights, interpolated bilinearly. */
-export interface HeightField {
-  /** World x and z of the first sample. */
-  readonly originM: readonly [number, number];
-  /** Distance between neighbouring samples, 0.01 to 1000. */
-  readonly cellM: number;
-  /** Number of samples along x, 2 to 1024. */
-  readonly columns: number;
-  /** Number of samples along z, 2 to 1024. */
-  readonly rows: number;
-  /** columns * rows heights in [-10000, 10000], row by row; x varies fastest. */
-  readonly heightsM: Float32Array;
-}
+export type HeightField = Readonly<messages.HeightFieldInfo>;
 
 /** Axis-aligned block with vertical sides and a flat top. */
 export interface TerrainBox {
@@ -150,39 +111,20 @@ export interface Terrain {
   readonly boxes: readonly TerrainBox[];
 }
 
-/** An avatar to spawn. */
-export interface SpawnItem {
-  /** Id of the avatar in its world, 1 to 2^32 - 1. Absent or 0: the server chooses. */
-  avatar?: number;
-  /** World position of the avatar's base frame. */
-  positionM: Vec3;
-  headingRad: number;
-  /**
-   * True: an existing avatar is moved there at once, instead of creating one. It drops its
-   * movements and requests, and stands. Requires `avatar`. Default false.
-   */
-  teleport?: boolean;
-}
+/** An avatar to spawn. `teleport` requires `avatar`. */
+export type SpawnItem = Optional<messages.SpawnItem, 'avatar' | 'teleport'>;
 
 /**
  * Starts, changes or ends a layer: a clip of the motion library that is blended over an avatar's
  * movements, for example waving. Layers do not change the legs and the root.
  */
-export interface LayerRequest {
-  readonly avatar: number;
-  /** Name of the layer, one of `World.layers`. */
-  readonly layer: string;
+export interface LayerRequest
+    extends Optional<Omit<messages.LayerItem, 'fadeOut'>, 'weight' | 'blendS' | 'speed'> {
   /**
    * True starts or changes the layer. False fades it out and ends it; `weight` and `speed` are then
    * ignored. Default true.
    */
   readonly enabled?: boolean;
-  /** Weight of the layer, above 0 and at most 1. Default 1. */
-  readonly weight?: number;
-  /** Time over which weight and speed change, 0 to 10. Default 0.3. */
-  readonly blendS?: number;
-  /** Playback rate, 0.1 to 4. Default 1, the speed of the recording. */
-  readonly speed?: number;
 }
 
 /**
@@ -206,85 +148,20 @@ export interface MovementRequest
 export type QueuedRequest = Readonly<RequestItem>;
 
 /** State of an avatar at a tick: the result of `World.inspect`. */
-export interface AvatarState {
-  readonly avatar: number;
-  readonly tick: number;
-  /** Server time of the tick. */
-  readonly timeS: number;
-  /** Base frame: position and heading at the start of the current movement. */
-  readonly basePositionM: Vec3;
-  readonly baseHeadingRad: number;
+export interface AvatarState
+    extends Readonly<Omit<messages.AvatarState,
+                          'type' | 'nonce' | 'world' | 'code' | 'text' | 'movement'>> {
   /** The current movement; null if the avatar is idle. */
   readonly movement: CurrentMovement | null;
-  /** Number of requests in the queue, without the current movement. */
-  readonly queueSize: number;
-  /** The first 16 requests of the queue. */
-  readonly queue: readonly QueuedRequest[];
-  /** True if foot planting is enabled, see `World.setPlanting`. */
-  readonly plantingEnabled: boolean;
-  /** Active layers, at most four. Later layers are blended over earlier ones. */
-  readonly layers: readonly PlayingLayer[];
-}
-
-/** A layer that is active on an avatar. */
-export interface PlayingLayer {
-  /** Name of the layer, one of `World.layers`. */
-  readonly layer: string;
-  /** Current weight, 0 to 1. */
-  readonly weight: number;
-  /** Current time in the layer's clip. */
-  readonly timeS: number;
-  /** Current playback rate; 1 is the speed of the recording. */
-  readonly speed: number;
-  /** True while the layer fades out. */
-  readonly ending: boolean;
-}
-
-/** The planned landing of a foot in the current movement. */
-export interface Landing {
-  readonly foot: Foot;
-  /** World position of the ball of the foot, on the ground. */
-  readonly positionM: Vec3;
-  readonly headingRad: number;
 }
 
 /** The movement that an avatar carries out. A stand has no group, keytimes or weights. */
-export interface CurrentMovement {
-  /**
-   * Id of the request; 0n if the server inserted the movement, for example a step between two
-   * requests.
-   */
-  readonly requestId: bigint;
-  readonly kind: MovementKind;
-  /** Index of the group of examples in the motion library; -1: none. */
-  readonly group: number;
-  /** Server time at which the movement started. */
-  readonly startTimeS: number;
+export interface CurrentMovement
+    extends Readonly<Omit<messages.CurrentMovement, 'parameterNames'>> {
   /** Server time of the last keytime. */
   readonly endTimeS: number;
-  /** Keytimes in seconds from the start of the movement, ascending; the first is 0. */
-  readonly keytimesS: Float64Array;
-  /** Keytime index plus fraction, 0 to the number of keytimes less 1. */
-  readonly genericTime: number;
-  /** Duration from the start over which the transition from the previous movement fades out. */
-  readonly easeOutS: number;
-  /** Parameters as requested. */
-  readonly requested: Parameters;
-  /** Parameters of the synthesized movement. */
-  readonly applied: Parameters;
-  /** True if the applied parameters are outside the range of the recorded examples. */
-  readonly extrapolated: boolean;
-  /** True if the requested parameters are out of reach and were clamped. */
-  readonly clamped: boolean;
-  /** Blend weights, one per example of the group. They sum to 1. */
-  readonly weights: Float32Array;
   /** Names of the columns of `exampleParameters`. */
   readonly parameterNames: readonly ParameterName[];
-  /** Parameters of the group's examples: one row of `parameterNames.length` numbers per weight.
-   * May be empty. */
-  readonly exampleParameters: Float32Array;
-  /** Landing positions of feet in the air. Empty if foot planting is disabled. */
-  readonly landings: readonly Landing[];
 }
 
 /** Rate and detail of poses within a distance from the centre of a region. */
@@ -351,85 +228,22 @@ export interface Subscription {
 }
 
 /** Something that happened to an avatar. Fields that the type does not use are 0, empty or null. */
-export interface WorldEvent {
-  readonly type: WorldEventType;
-  readonly avatar: number;
-  /**
-   * Id of the request; 0n if the event belongs to no request, for example a step that the server
-   * inserted.
-   */
-  readonly requestId: bigint;
-  readonly tick: number;
-  /** Server time, on the same clock as poses. */
-  readonly timeS: number;
-  /** Started, finished: the kind of the movement. */
-  readonly kind: MovementKind;
-  /** Started: index of the group of examples in the motion library; -1: none. */
-  readonly group: number;
-  /** Started: parameters as requested. */
-  readonly requested: Parameters;
-  /** Started: parameters of the synthesized movement. */
-  readonly applied: Parameters;
-  /** Started: the applied parameters are outside the range of the recorded examples. */
-  readonly extrapolated: boolean;
-  /**
-   * Started: the requested parameters are out of reach and were clamped. Accepted: the motion
-   * library cannot walk at the requested speed.
-   */
-  readonly clamped: boolean;
-  /** Finished: another request interrupted the movement before its end. */
-  readonly cutShort: boolean;
+export interface WorldEvent extends Readonly<Omit<messages.Event, 'foot'>> {
   /** Foot strike: the foot that landed. Rejected step: the foot that should have moved. */
   readonly foot: Foot | null;
-  /** Foot strike: where the foot landed. Rejected because it is out of reach: the nearest reachable
-   * position. */
-  readonly positionM: Vec3;
-  /** Finished, idle, spawned: the avatar's new base frame. */
-  readonly basePositionM: Vec3;
-  readonly baseHeadingRad: number;
-  /** Rejected: the cause, one of `Status`. */
-  readonly code: number;
-  /** Rejected: readable explanation. */
-  readonly reason: string;
-  /** Rejected because it is out of reach: distance between the requested and the nearest place. */
-  readonly missedM: number;
-  /** Rejected because it is out of reach: angle between the requested and the nearest direction or
-   * heading, the larger one. */
-  readonly missedRad: number;
-  /** Rejected because it is out of reach: the nearest step or jump, as in `MovementRequest`. */
-  readonly nearestLengthM: number;
-  readonly nearestSideM: number;
-  readonly nearestHeightM: number;
-  readonly nearestTurnRad: number;
-  /** Heading of the foot at `positionM`; after a jump, of the avatar. */
-  readonly nearestHeadingRad: number;
-  /** Accepted walk: the walking speed of the library that is nearest to the requested one. End of a
-   * walk: its mean speed without the first and the last steps. 0: unknown. */
-  readonly speedMPerS: number;
-  /** How the request ended. Every accepted request has exactly one event in which it is not `none`,
-   * and no event after it. */
-  readonly outcome: RequestOutcome;
 }
 
 /** Tip of a chain of joints, for example of the head or a toe. */
-export interface EndSite {
-  /** Index of the joint that the end site belongs to. */
-  readonly joint: number;
-  /** Position relative to the joint, in the joint's frame. */
-  readonly offsetM: Vec3;
-}
+export type EndSite = Readonly<messages.EndSiteInfo>;
+
+/** A layer that is active on an avatar. */
+export type PlayingLayer = Readonly<messages.PlayingLayer>;
+
+/** The planned landing of a foot in the current movement. */
+export type Landing = Readonly<messages.Landing>;
 
 /** Joints of a leg, as indices into the skeleton; -1: unknown. */
-export interface Leg {
-  readonly hip: number;
-  readonly knee: number;
-  readonly ankle: number;
-  readonly ball: number;
-  /** Ball of the foot, in the frame of the joint `ball`. */
-  readonly ballOffsetM: Vec3;
-  /** Tip of the toes, in the frame of the joint `ball`. */
-  readonly toeTipOffsetM: Vec3;
-}
+export type Leg = Readonly<messages.LegInfo>;
 
 /** The skeleton shared by all avatars of a world. */
 export interface Skeleton {
