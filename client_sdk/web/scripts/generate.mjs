@@ -1,10 +1,11 @@
-// Generates generated/ from the protocol's schema. The environment variables FLATC and PYTHON
-// override the paths of flatc and python3.
+// Generates generated/ from the protocol's schema and from the WebAssembly module. The environment
+// variables FLATC and PYTHON override the paths of flatc and python3.
 import {execFileSync} from 'node:child_process';
 import {
   existsSync, mkdirSync, readdirSync, rmSync, statSync, writeFileSync
 } from 'node:fs';
 import {fileURLToPath} from 'node:url';
+import {nativeModule, nativeSources} from './native.mjs';
 
 const path = (url) => fileURLToPath(new URL(url, import.meta.url));
 const schema = path('../../../protocol/schema/stridewire.fbs');
@@ -25,8 +26,8 @@ function run(variable, program, debianPackage, args) {
 
 const sources = readdirSync(generator).filter((file) => file.endsWith('.py'))
                     .map((file) => `${generator}/${file}`);
-const newest = Math.max(
-    ...[schema, path('generate.mjs'), ...sources].map((file) => statSync(file).mtimeMs));
+const newest = Math.max(...[schema, path('generate.mjs'), ...nativeSources, ...sources]
+                            .map((file) => statSync(file).mtimeMs));
 if (!existsSync(last) || statSync(last).mtimeMs < newest) {
   rmSync(out, {recursive: true, force: true});
   mkdirSync(out, {recursive: true});
@@ -36,5 +37,6 @@ if (!existsSync(last) || statSync(last).mtimeMs < newest) {
   const modules = readdirSync(`${out}/stridewire/wire`).sort();
   writeFileSync(`${out}/wire.ts`, modules.map((file) =>
       `export * from './stridewire/wire/${file.replace(/\.ts$/, '')}';\n`).join(''));
+  writeFileSync(`${out}/native.ts`, nativeModule());
   run('PYTHON', 'python3', 'python3', [`${generator}/generate.py`, schema, 'web', out]);
 }

@@ -1,42 +1,5 @@
 import moduleBytes from '../build/client.wasm';
-
-/** Functions of the WebAssembly module. wasm/client_module.cpp describes them. */
-interface Exports {
-  readonly memory: WebAssembly.Memory;
-  _initialize(): void;
-  results(): number;
-  input(bytes: number): number;
-  check_frame(bytes: number, fromClient: number): number;
-  encode_frame(bytes: number, fromClient: number): number;
-  decode_poses(infoBytes: number, bytes: number): number;
-  describe_status(status: number, name: number): void;
-  create(nameBytes: number, tokenBytes: number): number;
-  destroy(client: number): void;
-  open(client: number, bytes: number, nowS: number): void;
-  close(client: number, nowS: number): void;
-  state(client: number, nowS: number): number;
-  start_connecting(client: number, nowS: number): void;
-  on_connected(client: number, nowS: number): void;
-  on_frame(client: number, bytes: number, nowS: number): number;
-  take_library_request(client: number): number;
-  on_library(client: number, hashBytes: number, bytes: number): number;
-  on_lost(client: number, status: number, bytes: number, nowS: number): void;
-  advance(client: number, nowS: number): void;
-  take_output(client: number): number;
-  on_output_written(client: number): void;
-  next_event(client: number): number;
-  last_error(client: number): void;
-  command(client: number, world: number, bytes: number): number;
-  statistics(client: number, nowS: number): void;
-  server_time(client: number, nowS: number): number;
-  render_time(client: number, nowS: number): number;
-  find_world(client: number, id: number): number;
-  world_state(client: number, world: number): number;
-  clear_recording(client: number, world: number): void;
-  avatars(client: number, world: number): number;
-  sample(client: number, world: number, avatar: number, timeS: number): number;
-  sample_all(client: number, world: number, timeS: number, recorded: number): number;
-}
+import type {Exports} from '../generated/native';
 
 const textAt = 14;
 const textBytes = 15;

@@ -11,6 +11,7 @@ import type {
 import {
   MessageType, type Events, type Message, type Reply as ReplyMessage
 } from '../generated/messages';
+import {NativeEvent} from '../generated/native';
 import * as commands from './wire/commands';
 import {avatarStateOf, eventOf, terrainOf} from './wire/convert';
 import {Malformed} from './wire/check';
@@ -22,15 +23,10 @@ import {WorldHandle} from './world';
 const inspectTimeoutS = 10;
 const cacheTimeoutS = 5;
 
-/** States and events of the module, in the order of their numbers. */
+/** States of the module, in the order of their numbers. */
 const states: readonly ClientState[] =
     ['idle', 'waiting', 'connecting', 'handshake', 'ready', 'closing', 'closed'];
 const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
-const eventTypes = {
-  connected: 0, connectFailed: 1, connectionLost: 2, sessionLost: 3, closed: 4, reply: 6, item: 7,
-  lagging: 8, notice: 9, terrain: 11,
-} as const;
-
 interface Pending {
   readonly world: WorldHandle;
   readonly answer: (reply: Reply) => void;
@@ -552,28 +548,28 @@ export class Session {
       const [handle, status, command, , resumed, , droppedEvents] = [...results] as Repeat14;
       const world = this.findWorld(handle);
       switch (event) {
-        case eventTypes.connected:
+        case NativeEvent.connected:
           if (resumed === 0) this.lastEventsNumber = 0n;
           this.later(() => this.listeners.emit('connected', resumed !== 0));
           break;
-        case eventTypes.connectFailed:
-        case eventTypes.connectionLost:
+        case NativeEvent.connectFailed:
+        case NativeEvent.connectionLost:
           accepted = false;
           if (status === Status.protocol_error) ++this.total.invalidFrames;
           this.onError(status, text);
           break;
-        case eventTypes.sessionLost:
+        case NativeEvent.sessionLost:
           for (const each of this.worlds) {
             if (each.state !== 'refused' && each.state !== 'left') each.reset();
           }
           this.later(() => this.listeners.emit('sessionLost'));
           break;
-        case eventTypes.closed:
+        case NativeEvent.closed:
           accepted = false;
           if (status !== 0) this.onError(status, text);
           this.detach();
           break;
-        case eventTypes.reply: {
+        case NativeEvent.reply: {
           // A frame can cause replies to several commands, but describes only one of them.
           const reply = frame !== undefined && command === this.answered
               ? read() as ReplyMessage : undefined;
@@ -583,9 +579,9 @@ export class Session {
           if (pending !== undefined) this.later(() => pending.answer(result));
           break;
         }
-        case eventTypes.item:
-        case eventTypes.notice: this.notice(status, text); break;
-        case eventTypes.lagging: {
+        case NativeEvent.item:
+        case NativeEvent.notice: this.notice(status, text); break;
+        case NativeEvent.lagging: {
           if (world === undefined) break;
           const dropped = results[5]!;
           this.total.eventsDropped += Math.max(0, droppedEvents - world.reportedDroppedEvents);
@@ -593,7 +589,7 @@ export class Session {
           this.later(() => world.listeners.emit('lagging', dropped, droppedEvents));
           break;
         }
-        case eventTypes.terrain: {
+        case NativeEvent.terrain: {
           if (world === undefined) break;
           const sent = type === MessageType.WorldTerrain ? read() : null;
           const terrain = sent?.type === 'WorldTerrain' ? terrainOf(sent.terrain) : null;
