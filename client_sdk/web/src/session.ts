@@ -27,6 +27,24 @@ const cacheTimeoutS = 5;
 const states: readonly ClientState[] =
     ['idle', 'waiting', 'connecting', 'handshake', 'ready', 'closing', 'closed'];
 const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
+/** Results of `statistics`, in their order: from index 0 on, and from index 16 on. */
+const playoutNames = [
+  'jitterS', 'worstJitterS', 'heldSamples', 'tickHz', 'renderDelayS', 'targetDelayS', 'newestAgeS',
+  'extrapolatedSamples',
+] as const;
+const countNames = [
+  'bytesSent', 'batchesReceived', 'posesReceived', 'posesRefused', 'batchesMissing',
+  'batchesDropped', 'commandsSent', 'commandsResent', 'commandsWaiting', 'connects', 'resumes',
+  'connectFailures', 'bufferedBytes', 'rttS',
+] as const;
+
+/** Returns an object whose properties are numbers of `results`. */
+function named<K extends string>(names: readonly K[], first: number): {[name in K]: number} {
+  const {results} = native();
+  return Object.fromEntries(names.map((name, i) => [name, results[first + i]])) as
+      {[name in K]: number};
+}
+
 interface Pending {
   readonly world: WorldHandle;
   readonly answer: (reply: Reply) => void;
@@ -99,7 +117,7 @@ export class Session {
   }
   get tickHz(): number {
     native().call.statistics(this.client, 0);
-    return native().results[3]!;
+    return native().results[playoutNames.indexOf('tickHz')]!;
   }
   nextRequest(): bigint {
     return this.nextRequestId++;
@@ -156,9 +174,14 @@ export class Session {
 
   /** Sends the command that `make` returns. `make` throws an error if an argument is invalid. */
   command(world: WorldHandle, make: () => Draft): Promise<Reply> {
+    return this.attempt((resolve) => this.submit(world, make(), resolve));
+  }
+
+  /** Calls `send`. If it throws, the error becomes the reply. */
+  private attempt(send: (resolve: (reply: Reply) => void) => void): Promise<Reply> {
     return new Promise((resolve) => this.run(() => {
       try {
-        this.submit(world, make(), resolve);
+        send(resolve);
       } catch (error) {
         resolve(refusal(error));
       }
@@ -167,24 +190,20 @@ export class Session {
 
   observe(world: WorldHandle, observation: Observation): Subscription {
     const id = this.nextSubscription++;
-    const reply = new Promise<Reply>((resolve) => this.run(() => {
-      try {
-        const message = commands.observe(observation);
-        // A new subscription takes effect when the client connects.
-        if (world.handle === 0 && world.state === 'pending') {
-          checkMessage(message);
-          world.subscriptions.set(id, {message, handle: 0, answer: resolve});
-          return;
-        }
-        const handle = this.submit(world, message, (result) => {
-          if (!result.ok && result.code !== Status.cancelled) world.subscriptions.delete(id);
-          resolve(result);
-        });
-        world.subscriptions.set(id, {message, handle, answer: null});
-      } catch (error) {
-        resolve(refusal(error));
+    const reply = this.attempt((resolve) => {
+      const message = commands.observe(observation);
+      // A new subscription takes effect when the client connects.
+      if (world.handle === 0 && world.state === 'pending') {
+        checkMessage(message);
+        world.subscriptions.set(id, {message, handle: 0, answer: resolve});
+        return;
       }
-    }));
+      const handle = this.submit(world, message, (result) => {
+        if (!result.ok && result.code !== Status.cancelled) world.subscriptions.delete(id);
+        resolve(result);
+      });
+      world.subscriptions.set(id, {message, handle, answer: null});
+    });
     return {
       id,
       reply,
@@ -194,25 +213,20 @@ export class Session {
   }
 
   private moveRegion(world: WorldHandle, id: number, region: Region): Promise<Reply> {
-    return new Promise((resolve) => this.run(() => {
-      try {
-        const active = world.subscriptions.get(id);
-        if (active === undefined || active.message.region === null) {
-          throw new StridewireError(
-              Status.no_such_subscription, 'The subscription has no region.');
-        }
-        const moved = {...active.message, region: commands.region(region, active.message.detail)};
-        checkMessage(moved);
-        if (active.handle === 0) {  // The subscription was never sent.
-          resolve(makeReply(0, ''));
-        } else {
-          this.submit(world, {...moved, subscription: active.handle, replace: true}, resolve);
-        }
-        active.message = moved;
-      } catch (error) {
-        resolve(refusal(error));
+    return this.attempt((resolve) => {
+      const active = world.subscriptions.get(id);
+      if (active === undefined || active.message.region === null) {
+        throw new StridewireError(Status.no_such_subscription, 'The subscription has no region.');
       }
-    }));
+      const moved = {...active.message, region: commands.region(region, active.message.detail)};
+      checkMessage(moved);
+      if (active.handle === 0) {  // The subscription was never sent.
+        resolve(makeReply(0, ''));
+      } else {
+        this.submit(world, {...moved, subscription: active.handle, replace: true}, resolve);
+      }
+      active.message = moved;
+    });
   }
 
   private stopObserving(world: WorldHandle, id: number): Promise<Reply> {
@@ -222,15 +236,11 @@ export class Session {
       active.answer?.(makeReply(Status.cancelled, ''));
       return Promise.resolve(makeReply(0, ''));
     }
-    return new Promise((resolve) => this.run(() => {
-      try {
-        if (active === undefined) throw new StridewireError(Status.no_such_subscription, '');
-        this.submit(world, {type: 'StopObserving', subscription: active.handle}, resolve);
-        world.subscriptions.delete(id);
-      } catch (error) {
-        resolve(refusal(error));
-      }
-    }));
+    return this.attempt((resolve) => {
+      if (active === undefined) throw new StridewireError(Status.no_such_subscription, '');
+      this.submit(world, {type: 'StopObserving', subscription: active.handle}, resolve);
+      world.subscriptions.delete(id);
+    });
   }
 
   leave(world: WorldHandle): Promise<Reply> {
@@ -260,27 +270,16 @@ export class Session {
 
   statistics(nowS = 0): Statistics {
     native().call.statistics(this.client, nowS);
-    const {results} = native();
-    const [
-      bytesSent, batchesReceived, posesReceived, posesRefused, batchesMissing, batchesDropped,
-      commandsSent, commandsResent, commandsWaiting, connects, resumes, connectFailures,
-      bufferedBytes, rttS
-    ] = [...results.subarray(16)] as Repeat14;
-    const [
-      jitterS, worstJitterS, heldSamples, , renderDelayS, targetDelayS, newestAgeS,
-      extrapolatedSamples
-    ] = [...results] as Repeat14;
-    let recorded = 0;
-    for (const world of this.worlds) recorded += world.record.bytes;
+    const {tickHz: _, ...playout} = named(playoutNames, 0);
+    const counts = named(countNames, 16);
+    const {connects, posesReceived} = counts;
+    let bufferedBytes = counts.bufferedBytes + this.socketBytes();
+    for (const world of this.worlds) bufferedBytes += world.record.bytes;
     return {
-      ...this.total, bytesSent, batchesReceived, posesReceived, posesRefused, batchesMissing,
-      batchesDropped, commandsSent, commandsResent, commandsWaiting, connects, resumes,
-      connectFailures, rttS, jitterS, worstJitterS, heldSamples,
-      renderDelayS, targetDelayS, newestAgeS, extrapolatedSamples,
+      ...this.total, ...playout, ...counts, bufferedBytes,
       reconnects: Math.max(0, connects - 1),
       interpolationDelayS: this.interpolationDelayS,
       decodeNsPerPose: posesReceived === 0 ? 0 : 1e6 * this.decodeMs / posesReceived,
-      bufferedBytes: bufferedBytes + recorded + this.socketBytes(),
     };
   }
 
@@ -295,32 +294,33 @@ export class Session {
 
   /** Returns true if a connection attempt is due; then call startConnecting. */
   connectDue(nowS: number): boolean {
-    native().call.state(this.client, nowS);
-    return native().results[1] !== 0;
+    return this.stateNumber(1, nowS) !== 0;
   }
 
   /** Increases with every connection, so that late frames of an old one are recognised. */
   get connectionNumber(): number {
-    native().call.state(this.client, 0);
-    return native().results[3]!;
+    return this.stateNumber(3);
   }
 
   /** Returns the index of the address for the attempt that `startConnecting` has begun. */
   get addressIndex(): number {
-    native().call.state(this.client, 0);
-    return native().results[5]!;
+    return this.stateNumber(5);
   }
 
   /** Returns true if this state needs a socket. If not, the network closes it. */
   get needsSocket(): boolean {
-    native().call.state(this.client, 0);
-    return native().results[2] !== 0;
+    return this.stateNumber(2) !== 0;
   }
 
   /** Returns the next time at which to call advanceTime or connectDue; Infinity: never. */
   get nextTimeS(): number {
-    native().call.state(this.client, 0);
-    return native().results[0]!;
+    return this.stateNumber(0);
+  }
+
+  /** Returns a result of `state`. */
+  private stateNumber(index: number, nowS = 0): number {
+    native().call.state(this.client, nowS);
+    return native().results[index]!;
   }
 
   startConnecting(nowS: number): void {
@@ -545,7 +545,8 @@ export class Session {
       const event = native().call.next_event(this.client);
       if (event < 0) break;
       const {text, results} = native();
-      const [handle, status, command, , resumed, , droppedEvents] = [...results] as Repeat14;
+      const [handle = 0, status = 0, command = 0, , resumed, dropped = 0, droppedEvents = 0] =
+          results;
       const world = this.findWorld(handle);
       switch (event) {
         case NativeEvent.connected:
@@ -583,7 +584,6 @@ export class Session {
         case NativeEvent.notice: this.notice(status, text); break;
         case NativeEvent.lagging: {
           if (world === undefined) break;
-          const dropped = results[5]!;
           this.total.eventsDropped += Math.max(0, droppedEvents - world.reportedDroppedEvents);
           world.reportedDroppedEvents = Math.max(world.reportedDroppedEvents, droppedEvents);
           this.later(() => world.listeners.emit('lagging', dropped, droppedEvents));
@@ -748,9 +748,6 @@ export class Session {
     this.wake();
   }
 }
-
-type Repeat14 = [number, number, number, number, number, number, number, number, number, number,
-                 number, number, number, number];
 
 /** Frees the memory of clients that are no longer used. */
 const finalizers = new FinalizationRegistry<number>((client) => native().call.destroy(client));
