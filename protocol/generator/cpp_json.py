@@ -9,7 +9,13 @@ class CppJson(Cpp):
         if f.get("json_array") == "":
             parts = self.schema.tables[f.type].fields
             return "Json::array({" + ", ".join(f"{m}.{part.name}" for part in parts) + "})"
-        return f"!{m}" if "inverted" in f else f"Value({m})"
+        if "bytes" in f:
+            return f"Hexadecimal({m})"
+        if f.default == "null" or "optional" in f:
+            return f"{m} ? Json(*{m}) : Json()"
+        if f.type == "ulong":
+            return f"std::to_string({m})"
+        return f"!{m}" if "inverted" in f else m
 
     def condition(self, f):
         if "json_omit" not in f:
@@ -31,8 +37,8 @@ class CppJson(Cpp):
         return fields
 
     def json_function(self, table):
-        signature = f"Json Fields(const {self.type_name(table.name)}& m)"
-        lines = ["Json json = Json::object();"]
+        signature = f"void to_json(Json& json, const {self.type_name(table.name)}& m)"
+        lines = ["json = Json::object();"]
         for f in self.ordered(table):
             condition = self.used_if(f, "m.{}") + self.condition(f)
             if "borrowed" in f:  # The poses of a batch are decoded, and contain the other lists.
@@ -44,9 +50,9 @@ class CppJson(Cpp):
             elif "variant" not in table or "only" not in f:
                 lines.append(f'{condition}json["{f.name}"] = {self.value(f)};')
         if "variant" in table:
-            lines.append("std::visit([&](const auto& used) { json.update(Fields(used)); }, "
+            lines.append("std::visit([&](const auto& used) { json.update(Json(used)); }, "
                          f"{self.variant(table)});")
-        return self.function(signature, lines + ["return json;"])
+        return self.function(signature, lines)
 
     def parse(self, f):
         m = self.member(f)
@@ -59,7 +65,7 @@ class CppJson(Cpp):
         return [f'Get(json, "{f.name}", {m});']
 
     def parse_function(self, table):
-        signature = f"void FromJson(const Json& json, {self.type_name(table.name)}& m)"
+        signature = f"void from_json(const Json& json, {self.type_name(table.name)}& m)"
         fields = self.common_fields(table) if "variant" in table else table.fields
         arrays = {}
         lines = []
@@ -68,24 +74,29 @@ class CppJson(Cpp):
                 lines += ["ReadPoses(json, m);"] if f.name == "poses" else []
             elif name := f.get("json_array"):
                 position = arrays[name] = arrays.get(name, -1) + 1
-                lines.append(f'FromJson(json.at("{name}").at({position}), {self.member(f)});')
+                lines.append(f'json.at("{name}").at({position}).get_to({self.member(f)});')
             else:
                 lines += self.parse(f)
         if "variant" in table:
             lines.append('switch (json.at("type").get<int>()) {')
             for number, each in enumerate(self.schema.alternatives(table)):
                 target = f"{self.variant(table)}.emplace<{each.name}>()"
-                lines.append(f"  case {number}: FromJson(json, {target}); break;")
+                lines.append(f"  case {number}: json.get_to({target}); break;")
             lines.append("}")
         return self.function(signature, lines)
 
-    def array_functions(self, table):
-        """The functions of a vector or quaternion: name and lines of each."""
-        name = self.type_name(table.name)
+    def serializer(self, table):
+        """Conversions of a type that is not in namespace protocol."""
+        name = f"stridewire::{self.type_name(table.name)}"
         members = [self.member(f) for f in table.fields]
-        return {f"Json Value(const {name}& m)": [f"return Json::array({{{', '.join(members)}}});"],
-                f"void FromJson(const Json& json, {name}& m)":
-                    [f"json.at({i}).get_to({m});" for i, m in enumerate(members)]}
+        make = f"json = {{{', '.join(members)}}};"
+        parse = " ".join(f"json.at({i}).get_to({m});" for i, m in enumerate(members))
+        if "native" not in table:
+            make, parse = (f"stridewire::protocol::{name}(json, m);"
+                           for name in ("to_json", "from_json"))
+        return (f"template <>\nstruct nlohmann::adl_serializer<{name}> {{\n"
+                f"  static void to_json(auto& json, const {name}& m) {{ {make} }}\n"
+                f"  static void from_json(const auto& json, {name}& m) {{ {parse} }}\n}};\n")
 
     @property
     def arrays(self):
@@ -102,18 +113,16 @@ class CppJson(Cpp):
                 for each in (self.schema.alternatives(t) if "variant" in t else []) + [t]]
 
     def header(self):
-        declarations = "".join(f"[[nodiscard]] Json Fields(const {self.type_name(t.name)}& m);\n"
-                               f"void FromJson(const Json& json, {self.type_name(t.name)}& m);\n"
+        serializers = "".join(self.serializer(t) for t in self.arrays)
+        declarations = "".join(f"void to_json(Json& json, const {self.type_name(t.name)}& m);\n"
+                               f"void from_json(const Json& json, {self.type_name(t.name)}& m);\n"
                                for t in self.objects)
-        declarations += "".join(f"{signature};\n" for t in self.arrays
-                                for signature in self.array_functions(t))
+        serializers += "".join(self.serializer(t) for t in self.objects if t.by_hand("struct"))
         return (self.head() + "#pragma once\n\nnamespace stridewire::protocol {\n\n" +
-                declarations + "\n}  // namespace stridewire::protocol\n")
+                declarations + "\n}  // namespace stridewire::protocol\n\n" + serializers)
 
     def source(self):
-        functions = "".join(self.function(signature, lines) + "\n" for t in self.arrays
-                            for signature, lines in self.array_functions(t).items())
-        functions += "\n".join(self.json_function(t) + "\n" + self.parse_function(t)
+        functions = "\n".join(self.json_function(t) + "\n" + self.parse_function(t)
                               for t in self.objects)
         return (self.head() + '#include "json_support.h"\n\nnamespace stridewire::protocol {\n\n' +
                 functions + "\n}  // namespace stridewire::protocol\n")

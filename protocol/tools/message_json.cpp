@@ -12,7 +12,7 @@
 
 namespace stridewire::protocol {
 
-Json Value(const std::vector<std::byte>& bytes) {
+std::string Hexadecimal(const std::vector<std::byte>& bytes) {
   static constexpr char kDigits[] = "0123456789abcdef";
   std::string text;
   for (const std::byte b : bytes) {
@@ -32,14 +32,18 @@ Json PosesOf(const PoseBatch& m) {
     STRIDEWIRE_CHECK(reader.Decode(root, rotations));
     poses.push_back({{"avatar", m.avatars[i]},
                      {"flags", m.flags[i]},
-                     {"root_position_m", Value(root)},
-                     {"rotations", Value(rotations)}});
+                     {"root_position_m", root},
+                     {"rotations", rotations}});
   }
   return poses;
 }
 
-void FromJson(const Json& json, std::vector<std::byte>& out) {
-  const auto text = json.get<std::string>();
+void Get(const Json& json, const char* name, std::uint64_t& out) {
+  if (json.contains(name)) out = std::stoull(json[name].get<std::string>());
+}
+
+void Get(const Json& json, const char* name, std::vector<std::byte>& out) {
+  const auto text = json.value(name, std::string());
   out.clear();
   for (std::size_t i = 0; i + 1 < text.size(); i += 2) {
     out.push_back(static_cast<std::byte>(std::stoi(text.substr(i, 2), nullptr, 16)));
@@ -86,9 +90,7 @@ void ReadPoses(const Json& json, PoseBatch& m) {
 Json ToJson(const Message& message) {
   return std::visit(
       [](const auto& m) {
-        Json json = {{"type", MessageTypeName(m.kType)}, {"type_number", Value(m.kType)}};
-        json["fields"] = Fields(m);
-        return json;
+        return Json{{"type", MessageTypeName(m.kType)}, {"type_number", m.kType}, {"fields", m}};
       },
       message);
 }
@@ -98,7 +100,7 @@ Message FromJson(const Json& json) {
 #define STRIDEWIRE_CASE(Struct, Name, ...) \
   if (name == #Name) {                     \
     Struct message;                        \
-    FromJson(json.at("fields"), message);  \
+    json.at("fields").get_to(message);     \
     return message;                        \
   }
   STRIDEWIRE_MESSAGES(STRIDEWIRE_CASE)

@@ -19,7 +19,6 @@ PATTERNS = {
     "encoders and decoders": [
         "protocol/include/stridewire/protocol/encoder.h", "protocol/src/encoder.cpp",
         "protocol/include/stridewire/protocol/decode.h", "protocol/src/decode.cpp",
-        "protocol/src/list_codec.cpp",
         "protocol/src/codec_support.h", "protocol/src/unpacker.h"],
     "checks": ["protocol/include/stridewire/protocol/check.h", "protocol/src/check.cpp",
                "protocol/src/findings.*"],

@@ -163,7 +163,8 @@ class CppTest(unittest.TestCase):
     def test_writes_structs(self):
         header = self.cpp.structs_header()
         for line in ("  AvatarId avatar = 0;\n", "  std::optional<double> speed_m_s;",
-                     "  static constexpr MessageType kType = MessageType::kPaint;\n", "  Seq seq = 0;",
+                     "  static constexpr MessageType kType = MessageType::kPaint;\n",
+                     "  Seq seq = 0;",
                      "  Color color = Color::kRed;", "  std::vector<Item> items;",
                      "  bool visible = true;", "using Message = std::variant<Paint>;"):
             self.assertIn(line, header)
@@ -196,10 +197,9 @@ class CppTest(unittest.TestCase):
     def test_writes_json(self):
         source = CppJson(read(SMALL + 'struct A { x: ubyte (json_array: "xy"); '
                               'y: ubyte (json_array: "xy"); }')).source()
-        self.assertIn('json["xy"].push_back(Value(m.x));\n'
-                      '  json["xy"].push_back(Value(m.y));', source)
-        self.assertIn('FromJson(json.at("xy").at(1), m.y);', source)
-        self.assertIn('json["seq"] = Value(m.seq);', source)
+        self.assertIn('json["xy"].push_back(m.x);\n  json["xy"].push_back(m.y);', source)
+        self.assertIn('json.at("xy").at(1).get_to(m.y);', source)
+        self.assertIn('json["seq"] = std::to_string(m.seq);', source)
         self.assertIn('json["hidden"] = !m.visible;', source)
         self.assertIn('m.visible = !json.value("hidden", false);', source)
         self.assertIn('Get(json, "speed_m_s", m.speed_m_s);', source)
@@ -250,9 +250,9 @@ class VariantTest(unittest.TestCase):
 
     def test_writes_json_of_the_used_fields(self):
         source = CppJson(read(VARIANT)).source()
-        self.assertIn('  if (!m.at) json["far"] = Value(m.far);\n'
-                      '  if (m.at) json["at"] = Value(m.at);\n', source)
-        self.assertIn("    case 1: FromJson(json, m.movement.emplace<RunMovement>()); break;",
+        self.assertIn('  if (!m.at) json["far"] = m.far;\n'
+                      '  if (m.at) json["at"] = m.at ? Json(*m.at) : Json();\n', source)
+        self.assertIn("    case 1: json.get_to(m.movement.emplace<RunMovement>()); break;",
                       source)
 
     def test_web_client_reads_and_checks_only_used_fields(self):
