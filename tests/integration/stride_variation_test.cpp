@@ -184,7 +184,9 @@ TEST_P(StrideVariationOf, KeepsFootprints) {
   std::printf("%s: footprints within %.3g mm ahead, %.3g mm sideways\n", GetParam().name,
               1e3 * ahead_m, 1e3 * sideways_m);
   EXPECT_LT(ahead_m, 1e-3);
-  EXPECT_LT(sideways_m, 0.03);
+  // The sideways places of straight steps follow the blend. The step width
+  // of people varies by about 25 mm (Owings and Grabiner 2004).
+  EXPECT_LT(sideways_m, 0.045);
 }
 
 INSTANTIATE_TEST_SUITE_P(Libraries, StrideVariationOf,

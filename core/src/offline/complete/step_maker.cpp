@@ -12,6 +12,7 @@
 #include "offline/base/moving_window.h"
 #include "offline/builtin/leg_ik.h"
 #include "offline/builtin/swing_detour.h"
+#include "offline/extract/bend_toes.h"
 #include "offline/extract/extract.h"
 #include "runtime/library/keytimes.h"
 
@@ -212,6 +213,9 @@ class StepGenerator {
       EvaluateLeg(person_.skeleton, person_.rig, pose, foot, leg);
       SolveLeg(person_.rig, foot, leg, Vec3(TargetOf(state).ankle_m - root),
                Quat(state.ankle_rotation), pose);
+      pose.root_position_m = Vec3(root);
+      RaiseToeTip(person_.skeleton, person_.rig, foot,
+                  person_.rig.side(foot).toe_height_m - kMaxToeSinkM, pose);
     }
     return root;
   }

@@ -8,6 +8,7 @@
 
 #include "base/check.h"
 #include "offline/base/statistics.h"
+#include "offline/extract/bend_toes.h"
 #include "offline/extract/level_feet.h"
 #include "offline/extract/mirror.h"
 #include "runtime/library/knee_hinges.h"
@@ -162,6 +163,7 @@ class Assembler {
                       : "the captures contain no usable step or jump");
     }
     SetStandPose(library);
+    BendToes(leveller_->rig(), ball_height_m_, library);
     return library;
   }
 
