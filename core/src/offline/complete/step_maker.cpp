@@ -40,6 +40,11 @@ constexpr double kBackwardSlowdown = 1.15;
 // little before the toe-off detected in the captures, and rests a little after the heel-strike.
 constexpr double kSwingBegin = 0.92;
 constexpr double kSwingEnd = 2.06;
+// At both ends of the swing, the influence of the captured foot on the progress of the foot fades
+// during this fraction of the swing.
+constexpr double kSwingFade = 0.2;
+// The curves are rounded where they meet, by this fraction of the way between the footprints.
+constexpr double kSwingRounding = 0.02;
 // Minimum weight of the captured stride in the middle of a swing, for the rotation and the height
 // of the foot. It prevents feet from dragging along the ground in short steps.
 constexpr double kMinSwingShare = 0.45;
@@ -109,6 +114,7 @@ class StepGenerator {
     const double stand_z = person.StandVector(moving).z;
     start_share_ = Share((stand_z - feet.start_m.z) / (stand_z + stride_.start_length_m));
     end_share_ = Share((feet.end_m.z - stand_z) / (stride_.end_length_m - stand_z));
+    in_stride_ = std::min(1.0, 2.0 * std::min(start_share_, end_share_));
     outward_ = RotateYaw(0.5 * feet.turn_rad, DVec3(SideSign(moving), 0.0, 0.0));
     stand_leg_m_ = LegLength(person.skeleton, person.rig, person.stand, fixed_);
     SetTiming();
@@ -308,8 +314,24 @@ class StepGenerator {
     const DVec3 hip = root + HipAt(fixed_, time_s, RootRotationAt(time_s));
     const double rise_m =
         builtin::HighestHipM(hip, TargetOf(FootAt(fixed_, time_s)).ankle_m, leg_m) - hip.y;
-    const double in_stride = std::min(1.0, 2.0 * std::min(start_share_, end_share_));
-    return in_stride * rise_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
+    return in_stride_ * rise_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
+  }
+
+  // Returns the fraction of the way between its footprints that the moving foot has covered. Late
+  // in a stride, the foot is not ahead of the captured foot. Otherwise the leg could not reach the
+  // foot, and the body would have to be lowered. Starts and stops do not wait for the captured
+  // foot, because the pelvis would then accelerate more.
+  [[nodiscard]] double SwungAt(double time_s) const {
+    const auto f = Index(moving_);
+    const double swing = SwingAt(GenericAt(time_s));
+    const double from_m = stride_.points.front().balls_m[f].z;
+    const double to_m = stride_.points.back().balls_m[f].z;
+    const double captured = (sample_.balls_m[f].z - from_m) / (to_m - from_m);
+    const double plain = SmootherStep(swing);
+    const double weight = in_stride_ * SmoothStep(std::min(swing, 1.0 - swing) / kSwingFade);
+    const double lead = captured - plain;
+    const double lag = 0.5 * (lead - std::sqrt(lead * lead + kSwingRounding * kSwingRounding));
+    return plain + weight * lag;
   }
 
   [[nodiscard]] DVec3 PlainBallAt(Foot foot, double time_s) const {
@@ -319,8 +341,7 @@ class StepGenerator {
     DVec3 ball(0.0, stand_y + share * (sample_.balls_m[f].y - stand_y), 0.0);
     if (foot == fixed_) return ball;
     const DVec3 end = Turned(feet_.turn_rad, feet_.end_m);
-    const DVec3 place =
-        feet_.start_m + SmootherStep(SwingAt(GenericAt(time_s))) * (end - feet_.start_m);
+    const DVec3 place = feet_.start_m + SwungAt(time_s) * (end - feet_.start_m);
     ball.x = place.x;
     ball.z = place.z;
     return ball;
@@ -544,6 +565,7 @@ class StepGenerator {
   StepFeet feet_;
   double start_share_ = 0.0;
   double end_share_ = 0.0;
+  double in_stride_ = 0.0;  // 1 between long strides, 0 in steps that start or end in a stand.
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;
   double end_s_ = 0.0;

@@ -2,13 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "offline/builtin/figure.h"
 #include "offline/builtin/step.h"
 #include "offline/complete/generic_stride.h"
 #include "offline/extract/bend_toes.h"
 #include "runtime/library/knee_hinges.h"
+#include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire::complete {
 namespace {
@@ -44,6 +47,31 @@ struct Walker {
                     kCells, {}, "");
   }
 };
+
+// Distance from the fixed to the moving foot at a time.
+double AheadAt(const Walker& walker, const RawExample& example, double time_s) {
+  Pose pose(builtin::kFigureJointCount);
+  SampleClip(example.clip, time_s, pose);
+  return FootVector(walker.skeleton, pose, Foot::kLeft, 0.0).z;
+}
+
+// If it were ahead, its leg could not reach it, and the body would crouch.
+TEST(StepMaker, FeetDoNotArriveEarlierThanCapturedOnes) {
+  Walker walker;
+  StrideModel& stride = walker.person.strides[0];
+  const double length_m = stride.end_length_m;
+  const RawExample usual = walker.Stride(length_m);
+  // The captured foot is slower in the second half of its swing.
+  for (std::size_t p = 0; p < stride.points.size(); ++p) {
+    const double generic = static_cast<double>(p) / kPointsPerInterval;
+    const double late = std::clamp(2.0 * (generic - 1.5), 0.0, 1.0);
+    stride.points[p].balls_m[0].z -= 0.12 * 4.0 * late * (1.0 - late);
+  }
+  const RawExample late = walker.Stride(length_m);
+  const double time_s = 0.3 * late.keytimes_s[1] + 0.7 * late.keytimes_s[2];
+  EXPECT_LT(AheadAt(walker, late, time_s), AheadAt(walker, usual, time_s) - 0.03);
+  EXPECT_NEAR(AheadAt(walker, late, late.keytimes_s.back()), length_m, 1e-4);
+}
 
 TEST(StepMaker, ToesBendWhereTheirTipsWouldSink) {
   Walker walker;
