@@ -24,7 +24,7 @@ constexpr double kMaxWidthM = 0.4;
 constexpr double kPlainLiftM = 0.11;
 // Strides whose length differs from the median by more than this are not averaged.
 constexpr double kSameLengthM = 0.12;
-// Half the width of the window that smooths a single stride.
+// Half the width of the window that smooths the root of a single stride.
 constexpr double kRoughWindowS = 0.15;
 
 struct Stride {
@@ -92,44 +92,46 @@ std::vector<Stride> FindStrides(const RawLibrary& library, Foot moving) {
   return {};
 }
 
-// Returns the posture at a time that may be outside the stride. Beyond an end, the stride is
-// continued by point reflection about that end.
-PostureSample SampleAround(const StrideModel& model, double time_s) {
-  const double first_s = model.keytimes_s.front();
-  const double last_s = model.keytimes_s.back();
-  const bool is_before = time_s < first_s;
-  if (!is_before && time_s <= last_s) return model.At(GenericTime(model.keytimes_s, time_s));
-  const PostureSample& end = is_before ? model.points.front() : model.points.back();
-  const double inside_s = 2.0 * (is_before ? first_s : last_s) - time_s;
-  PostureSample sample =
-      model.At(GenericTime(model.keytimes_s, std::clamp(inside_s, first_s, last_s)));
-  sample.root_m = 2.0 * end.root_m - sample.root_m;
-  for (std::size_t j = 0; j < sample.rotations.size(); ++j) {
-    sample.rotations[j] = end.rotations[j] * glm::conjugate(sample.rotations[j]) * end.rotations[j];
-  }
-  return sample;
+// Returns the point before a generic time, and the fraction of the way to the next point.
+std::pair<std::size_t, double> PointAt(double generic_time) {
+  const double at =
+      std::clamp(generic_time, 0.0, static_cast<double>(kIntervals)) * kPointsPerInterval;
+  const int i = std::min(static_cast<int>(at), kPointCount - 2);
+  return {static_cast<std::size_t>(i), at - i};
 }
 
-// Smooths the body over time, except for the feet. Both ends of the stride remain unchanged.
-void SmoothBody(double window_s, StrideModel& model) {
+// Returns the root at a time that may be outside the stride. Beyond an end, the path is continued by
+// point reflection about that end.
+DVec3 RootAround(const StrideModel& model, double time_s) {
+  const double first_s = model.keytimes_s.front();
+  const double last_s = model.keytimes_s.back();
+  const auto root_at = [&](double at_s) {
+    const auto [k, share] = PointAt(GenericTime(model.keytimes_s, at_s));
+    return model.points[k].root_m + share * (model.points[k + 1].root_m - model.points[k].root_m);
+  };
+  const bool is_before = time_s < first_s;
+  if (!is_before && time_s <= last_s) return root_at(time_s);
+  const PostureSample& end = is_before ? model.points.front() : model.points.back();
+  const double inside_s = 2.0 * (is_before ? first_s : last_s) - time_s;
+  return 2.0 * end.root_m - root_at(std::clamp(inside_s, first_s, last_s));
+}
+
+// Smooths the path of the root over time. Both ends of the stride remain unchanged. The joints are
+// not smoothed: their fast movements make a walk look alive.
+void SmoothRoot(double window_s, StrideModel& model) {
   // Number of samples on each side of a point. The points are not evenly spaced in time, but the
   // samples are, so that uniform motion remains uniform.
   constexpr int kSide = 8;
   const StrideModel rough = model;
   for (std::size_t p = 1; p + 1 < rough.points.size(); ++p) {
     const double time_s = TimeAtPoint(model.keytimes_s, p);
-    PostureSample& point = model.points[p];
+    DVec3& root_m = model.points[p].root_m;
     double sum = 0.0;
     for (int k = -kSide; k <= kSide; ++k) {
       const double away = static_cast<double>(k) / (kSide + 1);
       const double weight = 1.0 - std::fabs(away);
       sum += weight;
-      const double share = weight / sum;
-      const PostureSample near = SampleAround(rough, time_s + away * window_s);
-      point.root_m += share * (near.root_m - point.root_m);
-      for (std::size_t j = 0; j < point.rotations.size(); ++j) {
-        point.rotations[j] = Blend(point.rotations[j], near.rotations[j], share);
-      }
+      root_m += weight / sum * (RootAround(rough, time_s + away * window_s) - root_m);
     }
   }
 }
@@ -171,8 +173,8 @@ StrideModel Average(const Skeleton& skeleton, const std::vector<Stride>& strides
   model.start_length_m /= count;
   model.end_length_m /= count;
   model.width_m /= count;
-  // The average of few strides contains more individual variation, so it is smoothed more.
-  SmoothBody(kRoughWindowS / std::sqrt(count), model);
+  // The average of few strides contains more individual variation, so its root is smoothed more.
+  SmoothRoot(kRoughWindowS / std::sqrt(count), model);
   return model;
 }
 
@@ -194,14 +196,6 @@ std::vector<RawExample> MirrorImages(const RawLibrary& library, const std::vecto
     images.push_back(MirrorExample(library.skeleton, *mirror, {}, source).example);
   }
   return images;
-}
-
-// Returns the point before a generic time, and the fraction of the way to the next point.
-std::pair<std::size_t, double> PointAt(double generic_time) {
-  const double at =
-      std::clamp(generic_time, 0.0, static_cast<double>(kIntervals)) * kPointsPerInterval;
-  const int i = std::min(static_cast<int>(at), kPointCount - 2);
-  return {static_cast<std::size_t>(i), at - i};
 }
 
 }  // namespace
