@@ -100,8 +100,8 @@ std::pair<std::size_t, double> PointAt(double generic_time) {
   return {static_cast<std::size_t>(i), at - i};
 }
 
-// Returns the root at a time that may be outside the stride. Beyond an end, the path is continued by
-// point reflection about that end.
+// Returns the root at a time that may be outside the stride. Beyond an end, its path is continued
+// by point reflection about that end.
 DVec3 RootAround(const StrideModel& model, double time_s) {
   const double first_s = model.keytimes_s.front();
   const double last_s = model.keytimes_s.back();

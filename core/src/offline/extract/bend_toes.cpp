@@ -16,8 +16,8 @@ namespace {
 // Toes are bent by at most 60 degrees.
 constexpr double kMaxBendRad = 1.05;
 // A ball that is closer than this to its height on level ground at an end of the movement stands on
-// level ground. In double support, the heel may have risen and the ball with it.
-constexpr double kLevelM = 0.05;
+// level ground. In double support, balls of level steps are 2 cm lower to 6 cm higher.
+constexpr double kLevelM = 0.07;
 // If the toes of the stand pose differ by more, its soles are not flat.
 constexpr double kSameToesM = 0.02;
 // Toes with a shorter horizontal part point up or down, and remain as they are.
@@ -58,8 +58,9 @@ class ToeBender {
     return leg;
   }
 
-  // Returns the height of a resting toe tip above the ball: the median while the other foot swings,
-  // or that in the stand pose if it is a little lower, minus kMaxToeSinkM. Returns nullopt if `foot` stands in no step.
+  // Returns the minimum height of a resting toe tip above the ball. It is the median while the
+  // other foot swings, or that in the stand pose if it is a little lower, minus kMaxToeSinkM.
+  // Returns nullopt if `foot` stands in no step.
   [[nodiscard]] std::optional<double> TipRise(Foot foot) const {
     std::vector<double> rises_m;
     for (const RawGroup& group : library_.groups) {
@@ -91,9 +92,12 @@ class ToeBender {
     Clip& clip = example.clip;
     const double before_m = RestingHeight(foot, clip.frame(0));
     const double after_m = RestingHeight(foot, clip.frame(clip.frame_count() - 1));
-    const int mid_swing = FrameAt(example, ToeOffKeytime(kind), 0.5);
+    const std::size_t toe_off = ToeOffKeytime(kind);
+    const double from_s = example.keytimes_s[toe_off];
+    const double over_s = example.keytimes_s[toe_off + 1] - from_s;
     for (int i = 0; i < clip.frame_count(); ++i) {
-      const double ball_m = i < mid_swing ? before_m : after_m;
+      const double swing = std::clamp((i / clip.fps - from_s) / over_s, 0.0, 1.0);
+      const double ball_m = before_m + swing * (after_m - before_m);
       RaiseToeTip(library_.skeleton, rig_, foot, ball_m + *tip_rise_m_[Index(foot)], clip.frame(i));
     }
   }

@@ -7,8 +7,8 @@
 
 namespace stridewire {
 
-/// Bent toes may be this far in the ground. Otherwise toes would hover in blends of steps whose toes
-/// differ.
+/// Bent toes may be this far in the ground. Otherwise toes would hover in blends of steps whose
+/// toes differ.
 inline constexpr double kMaxToeSinkM = 0.005;
 
 /// Bends the toes of a foot upward so that their tip is at least at a height in the frame of the
