@@ -51,11 +51,11 @@ std::size_t MovementRecording::Evaluate(std::uint64_t tick,
                                         std::span<const protocol::AvatarId> avatars, CrowdPose& out,
                                         std::size_t at) {
   if (spans_.empty()) return 0;
-  // The last movement of each avatar that begins at or before the tick.
+  // Finds, for each avatar, the newest movement that begins at or before the tick.
   found_.assign(avatars.size(), nullptr);
   for (auto span = spans_.rbegin(); span != spans_.rend(); ++span) {
     if (span->begin_tick > tick) continue;
-    // Twice the maximum, because the ticks of shards differ.
+    // Twice the maximum, because spans of different shards may be out of order.
     if (tick - span->begin_tick > 2 * kMaxTicks) break;
     const auto place = std::ranges::lower_bound(avatars, span->avatar);
     if (place == avatars.end() || *place != span->avatar) continue;

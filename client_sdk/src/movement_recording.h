@@ -19,23 +19,24 @@ namespace stridewire::client {
 /// are evaluated when they are needed, and equal the original ones except for rounding of the time.
 class MovementRecording {
  public:
-  /// Describes what has been recorded last for an avatar. The caller keeps one per avatar.
+  /// Identifies the last recorded movement of an avatar. The caller keeps one cursor per avatar.
   struct Cursor {
-    std::uint64_t recording = 0;  ///< Number of the recording; 0: nothing has been recorded.
+    std::uint64_t recording = 0;  ///< Number of the recording; 0: no movement is recorded.
     std::uint32_t movement = 0;   ///< AvatarReplica::movement_number().
     bool standing = false;
     std::uint64_t begin_tick = 0;
     double begin_s = 0.0;  ///< Time of the movement at `begin_tick`.
   };
 
-  /// Records the pose of an avatar that moves without layers. Stores a copy of its movement unless
-  /// the pose continues the one at `cursor`. `tick_s` is the length of a tick. Ticks must not
-  /// decrease, except for small differences between shards.
+  /// Records the pose of an avatar that has a movement and no layers. Stores a copy of the movement
+  /// unless the pose continues the movement of `cursor`. `tick_s` is the length of a tick. Ticks
+  /// must not decrease, except for small differences between shards.
   void Add(protocol::AvatarId avatar, const PoseStamp& stamp, const AvatarReplica& replica,
            const std::shared_ptr<const MotionLibrary>& library, double tick_s, Cursor& cursor);
 
   /// Evaluates the poses of these avatars in a tick and writes them to `out` from index `at` on.
-  /// Returns the number of poses. Omits avatars that were not recorded. `avatars` must ascend.
+  /// Returns the number of poses. Omits avatars that were not recorded. `avatars` must be in
+  /// ascending order.
   std::size_t Evaluate(std::uint64_t tick, std::span<const protocol::AvatarId> avatars,
                        CrowdPose& out, std::size_t at);
 
@@ -64,7 +65,8 @@ class MovementRecording {
   std::shared_ptr<const MotionLibrary> library_;
   std::optional<SoaPoseEvaluator> evaluator_;  // Has a value after the first evaluation.
   EvaluationBatcher batcher_;
-  std::deque<Span> spans_;    // Ascending by begin_tick, except for differences between shards.
+  // In ascending order of begin_tick, except for small differences between shards.
+  std::deque<Span> spans_;
   std::uint64_t number_ = 1;  // Clear increases it, which invalidates all cursors.
   std::size_t bytes_ = 0;
   std::vector<const Span*> found_;  // Scratch memory of Evaluate.

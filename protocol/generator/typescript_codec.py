@@ -200,7 +200,8 @@ class TypeScriptCodec(TypeScript):
             line = f"b.addFieldStruct({slot}, wire.{f.type}.create{f.type}(b, ...{value}), 0);"
         else:
             adder = ADDERS["ubyte" if self.enum_of(f) else f.type]
-            # No number equals NaN, so that 0 is stored, too.
+            # Values equal to this default are not stored. No number equals NaN, so 0 is stored,
+            # too.
             initial = "NaN" if f.default == "null" else "0n" if f.type == "ulong" else \
                 self.schema.enums[f.type].values[self.first_value(f)] if self.enum_of(f) else \
                 f.default or 0

@@ -1,5 +1,5 @@
-// The times that the page can show. Playback is live, in slow motion, paused, or in an earlier part
-// of the recording.
+// Playback determines the server time that the page shows: the live time, or an earlier time in the
+// recording. An earlier time stands still or advances, at full speed or in slow motion.
 
 export interface TimeRange {
   readonly firstS: number;

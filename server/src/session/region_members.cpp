@@ -123,7 +123,7 @@ RegionMembers::Change RegionMembers::Update(const Snapshot& snapshot) {
   left_.clear();
   due_.clear();
   std::size_t kept = 0;
-  const bool is_uniform = ring_count_ == 1;  // Usually a region has one ring.
+  const bool is_uniform = ring_count_ == 1;  // Most regions have one ring.
   for (const auto& [row, distance_m2] : near_) {
     const AvatarId id = (*shard.avatars)[row];
     const Ring& ring = is_uniform ? rings_[0] : RingAt(distance_m2);

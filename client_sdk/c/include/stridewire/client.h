@@ -309,7 +309,7 @@ typedef struct stridewire_height_field {
   double cell_m;           ///< Distance between neighbouring samples, 0.01 to 1000.
   uint32_t columns;        ///< Number of samples along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
   uint32_t rows;           ///< Number of samples along z, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
-  const float* heights_m;  ///< Heights of columns * rows samples, row by row along x.
+  const float* heights_m;  ///< Heights of columns * rows samples, row by row, x fastest.
 } stridewire_height_field;
 
 /// A block with vertical sides and a flat top.
@@ -668,7 +668,7 @@ typedef struct stridewire_terrain {
 
 /// Arrays that receive the parts of a terrain. An array may be NULL if its capacity is 0.
 typedef struct stridewire_terrain_buffers {
-  float* heights_m;  ///< Receives columns * rows heights, row by row along x.
+  float* heights_m;  ///< Receives columns * rows heights, row by row, x fastest.
   size_t height_capacity;
   stridewire_terrain_box* boxes;
   size_t box_capacity;

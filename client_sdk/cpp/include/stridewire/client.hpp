@@ -159,7 +159,7 @@ struct Skeleton : stridewire_skeleton {
 /// The terrain of a world. It has no height field if `columns` is 0.
 struct Terrain : stridewire_terrain {
   Terrain() : stridewire_terrain() {}
-  std::vector<float> heights_m;  ///< columns * rows heights, row by row along x.
+  std::vector<float> heights_m;  ///< columns * rows heights, row by row, x fastest.
   std::vector<stridewire_terrain_box> boxes;
 };
 

@@ -423,7 +423,7 @@ function groupLabel(group: GroupEntry): string {
 
 /**
  * Returns the indices of the two parameters with the widest range over the examples, in ascending
- * order. If there is only one parameter, its index twice.
+ * order. If there is only one parameter, returns its index twice.
  */
 export function widestParameters(group: Group): [number, number] {
   // A turn of one radian counts as half a metre.

@@ -19,7 +19,8 @@ template <class NearestM>
   double widest_m = 0.0;
   for (double detour_m = 0.0; detour_m < range.max_m; detour_m += range.step_m) {
     const double distance_m = nearest_m(detour_m);
-    // If the feet are closest at the landing, a detour has no effect.
+    // A longer detour must increase the distance noticeably. It does not if the feet are closest at
+    // the landing, which detours do not change.
     if (distance_m <= widest_m + kSmallestGainM) continue;
     widest_m = distance_m;
     best_m = detour_m;

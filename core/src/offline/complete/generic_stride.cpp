@@ -12,7 +12,7 @@
 namespace stridewire::complete {
 namespace {
 
-// Stride length for the leg length of the generated figure.
+// Length of the stride of the generated figure. It is scaled by the ratio of leg lengths.
 constexpr double kStrideLengthM = 0.55;
 constexpr double kArmSwingRad = 0.2;
 
@@ -45,8 +45,8 @@ Pose StandOfFigure(const Skeleton& figure) {
 
 // Transfers poses of the generated figure to a person. Feet, pelvis, chest and head of the person
 // deviate from the person's stand pose as those of the figure deviate from its own stand pose. The
-// hips are placed by the leg on the ground, which is bent as far as the figure's. A person who
-// crouches in the stand pose, for example to fight, therefore walks upright.
+// height of the hips is such that the leg of the fixed foot bends as far as the figure's. A person
+// who crouches in the stand pose, for example to fight, therefore walks upright.
 class PoseTransfer {
  public:
   PoseTransfer(const Skeleton& figure, const Skeleton& skeleton, const LegRig& rig,
@@ -78,7 +78,8 @@ class PoseTransfer {
       to.balls_m[f] = scale_ * (from.posture.balls_m[f] - origin);
       to.balls_m[f].y =
           stand_.balls_m[f].y + scale_ * (from.posture.balls_m[f].y - figure.balls_m[f].y);
-      // Feet that point outward are as far apart at the ankles as those of the figure.
+      // Sideways, the ankles are as far apart as those of the figure, scaled to the person. Feet
+      // that point further outward therefore have their balls further apart.
       const double ankle_x_m = scale_ * from.Ankle(static_cast<Foot>(f)).x;
       to.balls_m[f].x = ankle_x_m + (to.ankles[f] * ankle_to_ball_[f]).x;
     }
@@ -107,7 +108,8 @@ class PoseTransfer {
     return to;
   }
 
-  // Adds the swing of both arms. Positive angles move the arm on the moving foot's side forward.
+  // Swings both arms in opposite directions. A positive angle moves the arm on the moving foot's
+  // side forward.
   void SwingArms(Foot moving, double forward_rad, PostureSample& sample) const {
     for (const UpperBodyChains::UpperArm& arm : chains_.upper_arms) {
       const bool is_on_moving_side = arm.is_left == (moving == Foot::kLeft);

@@ -7,7 +7,7 @@
 namespace stridewire::complete {
 
 /// Returns a stride for a person whose captures contain none. It is a stride of the library
-/// `builtin`, converted to the proportions of the person. Feet, pelvis, chest and head deviate from
+/// `builtin`, adapted to the proportions of the person. Feet, pelvis, chest and head deviate from
 /// the person's stand pose as those of the generated figure deviate from its own stand pose, and
 /// the arms swing a little. The legs bend as far as the figure's, and the trunk leans as in a walk,
 /// even if the person crouches in the stand pose.

@@ -40,10 +40,11 @@ constexpr double kBackwardSlowdown = 1.15;
 // little before the toe-off detected in the captures, and rests a little after the heel-strike.
 constexpr double kSwingBegin = 0.92;
 constexpr double kSwingEnd = 2.06;
-// At both ends of the swing, the influence of the captured foot on the progress of the foot fades
-// during this fraction of the swing.
+// SwungAt limits the progress of the foot to that of the captured foot. The limit fades in and out
+// during this fraction of the swing at each end.
 constexpr double kSwingFade = 0.2;
-// The curves are rounded where they meet, by this fraction of the way between the footprints.
+// Rounds the corner where this limit begins or ceases to apply, as a fraction of the way between
+// the footprints.
 constexpr double kSwingRounding = 0.02;
 // Minimum weight of the captured stride in the middle of a swing, for the rotation and the height
 // of the foot. It prevents feet from dragging along the ground in short steps.
@@ -64,7 +65,7 @@ constexpr double kMaxShare = 1.15;
 // Maximum distance from hip to ankle, as a fraction of the leg length. If the legs of the stand
 // pose are straighter, their extension is the maximum.
 constexpr double kMaxExtension = 0.996;
-// Part of the step's duration in which the correction of the fixed leg fades in, and out.
+// StanceRiseAt fades in during this fraction of the step at its start, and out at its end.
 constexpr double kStanceFade = 0.35;
 
 // Most steps do not turn, so these functions avoid trigonometry for the angle 0.
@@ -75,7 +76,7 @@ DQuat Turned(double yaw_rad, const DQuat& q) {
 
 std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
 
-// The cubic curve with given positions and velocities at both ends.
+// A cubic curve with the given positions and velocities at both ends.
 struct HermiteCurve {
   DVec3 from = DVec3(0.0);
   DVec3 from_velocity = DVec3(0.0);
@@ -131,8 +132,8 @@ class StepGenerator {
     return {0.0, toe_off_s_, strike_s_, end_s_};
   }
 
-  // Returns a clip with a frame at each of these times, from 0 to the last keytime. If they are in
-  // decreasing order, the clip is the step in reverse. Does not set the frame rate.
+  // Returns a clip with a frame at each of these times, which are between 0 and the last keytime.
+  // If they are in decreasing order, the clip is the step in reverse. Does not set the frame rate.
   Clip Run(std::span<const double> times_s) {
     PlanSwing();
     PlanLowering();
@@ -156,7 +157,7 @@ class StepGenerator {
   // A foot at some time. Positions are relative to the fixed ball.
   struct FootState {
     DQuat ankle_rotation;       // World rotation of the ankle.
-    DVec3 ball_m = DVec3(0.0);  // Before the detour and the lift are added.
+    DVec3 ball_m = DVec3(0.0);  // Without the detour and the lift, which BallOf adds.
     double swing = 0.0;         // Factor of the detour and the lift.
     DVec3 ankle_to_ball = DVec3(0.0);
     DVec3 ankle_to_tip = DVec3(0.0);
@@ -262,7 +263,8 @@ class StepGenerator {
                  stride_.MeasuredEndVelocity(), stride_.keytimes_s[3]};
     const auto state = [&](const PostureSample& stride, const DVec3& feet_m, double share) {
       DVec3 from_feet = RootFromFeet(stride) - RootFromFeet(person_.stand);
-      // On straight legs, a body falls with the square of the distance between the feet.
+      // With straight legs, the body is lower by an amount that is proportional to the square of
+      // the distance between the feet.
       from_feet *= DVec3(share, share * share, share);
       from_feet += RootFromFeet(person_.stand);
       return 0.5 * DVec3(feet_m.x, 0.0, feet_m.z) + from_feet;
@@ -283,7 +285,7 @@ class StepGenerator {
     root_.duration_s = end_s_;
   }
 
-  // Returns the root before it is lowered so that the legs reach the feet.
+  // Returns the position of the root without the lowering that lets the legs reach the feet.
   [[nodiscard]] DVec3 RootAt(double time_s) const {
     const double generic = GenericAt(time_s);
     const double share = std::min(1.0, ShareAt(time_s));
@@ -294,8 +296,8 @@ class StepGenerator {
     const double usual_m_s = share * captured_.VelocityAt(captured_s).z;
     const double speed_m_s = Turned(-heading, root_.VelocityAt(time_s)).z;
     if (usual_m_s > 0.0) deviation.z *= std::clamp(speed_m_s / usual_m_s, 0.0, 1.0);
-    // The ball of the fixed foot is the origin, and the root is midway between the feet. In
-    // strides, momentum carries the body, so the weight shifts less.
+    // The ball of the fixed foot is the origin, and the root is about midway between the feet. In
+    // strides, momentum carries the body, so the weight shifts less towards the fixed foot.
     const double to_fixed_m = -0.5 * (feet_.start_m.x + feet_.end_m.x) * 0.5;
     const DVec3 sway(kSwayShare * (1.0 - share) * to_fixed_m * Bump(time_s / end_s_), 0.0, 0.0);
     DVec3 root = root_.At(time_s) + Turned(heading, deviation + sway);
@@ -303,10 +305,10 @@ class StepGenerator {
     return root;
   }
 
-  // Returns by how much the root is raised in single support so that the fixed leg is bent as in a
-  // blend of the stand and the captured stride. Blended heights of the root would bend it further,
-  // because a body falls less than in proportion to the length of the step. Starts and stops keep
-  // the blended heights, because a rise would make the pelvis accelerate more.
+  // Returns how far the root is raised in the middle of the step so that the fixed leg bends as in
+  // a blend of the stand and the captured stride. Without this correction, the leg would bend
+  // further in short steps, because a body falls less than in proportion to the length of the step.
+  // Starts and stops are not corrected, because a rise would make the pelvis accelerate more.
   [[nodiscard]] double StanceRiseAt(double time_s, const DVec3& root) const {
     const double fade_s = kStanceFade * end_s_;
     const double share = std::min(1.0, ShareAt(time_s));
@@ -317,10 +319,11 @@ class StepGenerator {
     return in_stride_ * rise_m * SmoothStep(std::min(time_s, end_s_ - time_s) / fade_s);
   }
 
-  // Returns the fraction of the way between its footprints that the moving foot has covered. Late
-  // in a stride, the foot is not ahead of the captured foot. Otherwise the leg could not reach the
-  // foot, and the body would have to be lowered. Starts and stops do not wait for the captured
-  // foot, because the pelvis would then accelerate more.
+  // Returns the fraction of the way between its footprints that the moving foot has covered. In
+  // strides, the foot never covers a larger fraction than the captured foot has covered, except
+  // near both ends of the swing. Late in the swing, the leg could otherwise not reach the foot, and
+  // the root would have to be lowered. Starts and stops have no such limit, because it would make
+  // the pelvis accelerate more.
   [[nodiscard]] double SwungAt(double time_s) const {
     const auto f = Index(moving_);
     const double swing = SwingAt(GenericAt(time_s));
@@ -363,7 +366,9 @@ class StepGenerator {
                   Blend(person_.stand.ankles[f], sample_.ankles[f], std::min(1.0, share)));
   }
 
-  // Returns the rotation of a joint before inverse kinematics, without turning.
+  // Returns a blend of the rotations of a joint in the stand pose and in the captured stride.
+  // `share` is the weight of the stride. The turn of the step and inverse kinematics are not
+  // included.
   [[nodiscard]] DQuat MixedRotation(std::size_t joint, double share) const {
     return Blend(person_.stand.rotations[joint], sample_.rotations[joint], share);
   }
@@ -430,15 +435,15 @@ class StepGenerator {
     return nearest;
   }
 
-  // Returns a foot near a fraction of the swing, 0 to 1.
+  // Returns the state of a foot in the frame nearest to a fraction of the swing, 0 to 1.
   FootState FootInSwing(Foot foot, double part) {
     const double time_s = ToFrames(toe_off_s_ + part * (strike_s_ - toe_off_s_));
     stride_.Sample(GenericAt(time_s), reach_joints_, sample_);
     return FootAt(foot, time_s);
   }
 
-  // If the step turns, leads the swinging foot around the fixed one. Raises it until it clears the
-  // ground.
+  // Plans the detour and the lift of the swinging foot. If the step turns, the foot moves around
+  // the fixed one. The lift grows until the foot clears the ground, up to kMaxLiftM.
   void PlanSwing() {
     if (feet_.turn_rad != 0.0) PlanDetour();
     const LegRig::Side& side = person_.rig.side(moving_);
@@ -565,14 +570,15 @@ class StepGenerator {
   StepFeet feet_;
   double start_share_ = 0.0;
   double end_share_ = 0.0;
-  double in_stride_ = 0.0;  // 1 between long strides, 0 in steps that start or end in a stand.
+  // 1 in steps that start and end in a stride, 0 in steps that start or end in a stand.
+  double in_stride_ = 0.0;
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;
   double end_s_ = 0.0;
   double stand_leg_m_ = 0.0;         // Distance from hip to ankle of the fixed leg in the stand.
   std::array<double, 2> reach_m_{};  // [Foot]: largest distance from hip to ankle.
-  HermiteCurve captured_;            // Curve with the start and end of the captured root.
-  HermiteCurve root_;                // Curve with the start and end of the generated root.
+  HermiteCurve captured_;            // Has the ends and end velocities of the captured root.
+  HermiteCurve root_;                // Has the ends and end velocities of the generated root.
   DVec3 outward_ = DVec3(0.0);       // Direction of a detour, away from the fixed foot.
   std::vector<double> lowered_m_;    // Lowering of the root, evenly sampled from 0 to end_s_.
   double detour_m_ = 0.0;

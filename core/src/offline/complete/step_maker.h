@@ -25,9 +25,10 @@ struct Person {
 
 /// Position of the feet at both ends of a step, as in the parameters of a general step.
 struct StepFeet {
-  DVec3 start_m = DVec3(0.0);  ///< Vector from the fixed to the moving foot, in the heading frame.
-  DVec3 end_m = DVec3(0.0);
-  double turn_rad = 0.0;  ///< Positive is left.
+  /// Vector from the fixed to the moving foot at the start, in the heading frame of the start.
+  DVec3 start_m = DVec3(0.0);
+  DVec3 end_m = DVec3(0.0);  ///< The same vector at the end, in the heading frame of the end.
+  double turn_rad = 0.0;     ///< Change of heading; positive is left.
 };
 
 /// A step to generate.
@@ -47,7 +48,9 @@ struct StepSpec {
 /// and the stand pose without a jump, and has the posture and style of the person.
 ///
 /// The feet are placed first. The root then follows a cubic curve, plus w times the deviation of
-/// the captured root from such a curve. Finally, inverse kinematics places the legs.
+/// the captured root from such a curve. The height of the root is corrected so that the fixed leg
+/// bends as in the blend, and so that both legs reach the feet. Finally, inverse kinematics sets
+/// the legs, and toes bend where they would be in the ground (RaiseToeTip).
 ///
 /// A step backward is a forward step from `feet.end_m` to `feet.start_m`, played in reverse. Its
 /// moving foot is in front in `feet.start_m` and behind in `feet.end_m`, and it does not turn.

@@ -24,7 +24,8 @@ constexpr double kMaxWidthM = 0.4;
 constexpr double kPlainLiftM = 0.11;
 // Strides whose length differs from the median by more than this are not averaged.
 constexpr double kSameLengthM = 0.12;
-// Half the width of the window that smooths the root of a single stride.
+// Half the width of the window that smooths the root of a single stride. For the mean of n strides,
+// it is divided by sqrt(n).
 constexpr double kRoughWindowS = 0.15;
 
 struct Stride {
@@ -269,8 +270,9 @@ void JoinStrides(std::array<StrideModel, 2>& strides) {
       }
       point.root_m += weight * kShare * (RootFromFeet(to) - RootFromFeet(from));
     };
-    // The correction fades out over the fraction kFadePart of the stride's duration. Points are not
-    // evenly spaced in time: one third of them is in double support, which may be very short.
+    // The correction fades out over the fraction kFadePart of the stride's duration, and not over a
+    // fraction of its points. Points are not evenly spaced in time: a third of them is in the
+    // double support at each end of the stride, which may be very short.
     const auto weight_at = [](const StrideModel& stride, std::size_t point, double end_s) {
       const double fade_s = kFadePart * (stride.keytimes_s.back() - stride.keytimes_s.front());
       return 1.0 - SmoothStep(std::fabs(TimeAtPoint(stride.keytimes_s, point) - end_s) / fade_s);

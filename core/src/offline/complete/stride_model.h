@@ -24,13 +24,13 @@ struct StrideModel {
   std::array<double, kIntervals + 1> keytimes_s{};
   double start_length_m = 0.0;  ///< Distance by which the fixed foot is ahead at the start.
   double end_length_m = 0.0;    ///< Distance by which the moving foot is ahead at the end.
-  /// Sideways distance of the moving from the fixed foot, outwards; mean of start and end.
+  /// Sideways distance from the fixed to the moving foot, positive outward; mean of start and end.
   double width_m = 0.0;
 
   /// [point]: distance from hip to ankle of the fixed leg. Set by MeasureLegs.
   std::vector<double> leg_m;
 
-  /// Velocities of the root at the ends of the stride, in m/s. After JoinStrides, the velocity at
+  /// Velocities of the root at the ends of the stride, in m/s. Set by JoinStrides: the velocity at
   /// the end of one foot's stride equals that at the start of the other foot's stride.
   DVec3 start_velocity = DVec3(0.0);
   DVec3 end_velocity = DVec3(0.0);
@@ -49,8 +49,9 @@ struct StrideModel {
 };
 
 /// Changes the strides of both feet so that each continues the other. The end of one and the start
-/// of the other are averages of different steps, so they differ. Both get the mean posture and
-/// velocity. The differences are distributed over 45 % of the time of each stride.
+/// of the other are averages of different steps, so they differ. Both get the mean of their
+/// postures and velocities. The corrections fade out over 45 % of the duration of each stride, and
+/// those of the feet within double support.
 void JoinStrides(std::array<StrideModel, 2>& strides);
 
 /// Measures the fixed legs of both strides, and sets StrideModel::leg_m.

@@ -12,8 +12,8 @@ namespace {
 
 // Minimum length of an upper arm. Collar bones and shoulder blades are shorter.
 constexpr float kUpperArmM = 0.15f;
-// Range of the lean of a standing trunk. In a walk, the lean grows by about 3 degrees, and the
-// trunks of people lean by -4 to 10 degrees.
+// Range of the lean of a standing trunk; positive is forward. The trunks of people who walk lean by
+// -4 to 10 degrees, and a walk adds about 3 degrees to the lean of the stand pose.
 constexpr double kMinLeanRad = -4.0 * builtin::kDegree;
 constexpr double kMaxLeanRad = 6.0 * builtin::kDegree;
 

@@ -8,7 +8,7 @@
 
 namespace stridewire::complete {
 
-/// The joints through which trunk, head and arms are turned.
+/// The joints that turn the trunk, the head and the arms.
 struct UpperBodyChains {
   struct UpperArm {
     std::size_t joint = 0;  ///< The joint at the shoulder, which moves the upper arm.
@@ -23,6 +23,8 @@ struct UpperBodyChains {
   std::vector<UpperArm> upper_arms;
 };
 
+/// Finds the chains of a skeleton by their shape in the stand pose. All chains are empty unless
+/// exactly two upper arms are found.
 [[nodiscard]] UpperBodyChains FindUpperBodyChains(const Skeleton& skeleton,
                                                   const PostureSample& stand);
 
@@ -43,8 +45,9 @@ void TurnUpperBody(const Skeleton& skeleton, const UpperBodyChains& chains,
 void SwingArm(const Skeleton& skeleton, const UpperBodyChains::UpperArm& arm, double forward_rad,
               PostureSample& sample);
 
-/// Straightens a trunk that leans further forward or back than people's do in a walk. Head and arms
-/// keep their directions. Without arms, the lean is unknown, and the posture remains as it is.
+/// Returns a posture whose trunk leans no further forward or back than that of a person who walks.
+/// Head and arms keep their directions. If the arms were not found, the lean cannot be measured,
+/// and the posture is returned unchanged.
 [[nodiscard]] PostureSample LimitLean(const Skeleton& skeleton, const UpperBodyChains& chains,
                                       const PostureSample& sample);
 

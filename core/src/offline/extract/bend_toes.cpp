@@ -15,12 +15,14 @@ namespace {
 
 // Toes are bent by at most 60 degrees.
 constexpr double kMaxBendRad = 1.05;
-// A ball that is closer than this to its height on level ground at an end of the movement stands on
-// level ground. In double support, balls of level steps are 2 cm lower to 6 cm higher.
+// If the height of a ball at an end of the movement differs from `ball_height_m` by less than this,
+// the foot counts as standing on level ground. At the ends of level steps, balls are up to 2 cm
+// below and up to 6 cm above that height.
 constexpr double kLevelM = 0.07;
-// If the toes of the stand pose differ by more, its soles are not flat.
+// If the toe tips of the stand pose differ from those in mid-stance by at least this, the soles of
+// the stand pose are not flat.
 constexpr double kSameToesM = 0.02;
-// Toes with a shorter horizontal part point up or down, and remain as they are.
+// Toes whose horizontal extent is shorter than this point straight up or down. They are not bent.
 constexpr double kMinFlatM = 1e-3;
 
 std::size_t Index(Foot foot) { return static_cast<std::size_t>(foot); }
@@ -33,7 +35,7 @@ int FrameAt(const RawExample& example, std::size_t keytime, double fraction) {
   return std::clamp(frame, 0, example.clip.frame_count() - 1);
 }
 
-// Index of the keytime at which feet leave the ground. They land at the next one.
+// Returns the index of the keytime at which feet leave the ground. They land at the next keytime.
 std::size_t ToeOffKeytime(MovementKind kind) { return IsStep(kind) ? 1 : 2; }
 
 class ToeBender {
@@ -58,9 +60,10 @@ class ToeBender {
     return leg;
   }
 
-  // Returns the minimum height of a resting toe tip above the ball. It is the median while the
-  // other foot swings, or that in the stand pose if it is a little lower, minus kMaxToeSinkM.
-  // Returns nullopt if `foot` stands in no step.
+  // Returns the minimum height of the toe tip relative to a resting ball: its resting height minus
+  // kMaxToeSinkM. The resting height is the median over all steps in the middle of the other foot's
+  // swing, or that in the stand pose if it is a little lower. Returns nullopt if the other foot
+  // swings in no step.
   [[nodiscard]] std::optional<double> TipRise(Foot foot) const {
     std::vector<double> rises_m;
     for (const RawGroup& group : library_.groups) {
@@ -80,7 +83,7 @@ class ToeBender {
     return rest_m - kMaxToeSinkM;
   }
 
-  // Returns the height at which the ball of a foot rests on the ground, at an end of an example.
+  // Returns the height of the resting ball of a foot at an end of an example, whose pose is `end`.
   [[nodiscard]] double RestingHeight(Foot foot, ConstPoseSpan end) const {
     const double level_m = ball_height_m_[Index(foot)];
     const double ball_m = end.root_position_m.y + LegOf(end, foot).ball_m.y;

@@ -27,7 +27,7 @@ struct ExtractOptions {
   /// foot's side.
   double straight_side_max_m = 0.3;
   /// If the centre of the feet moves farther than this, the heading is the direction of that
-  /// motion, which is more accurate than the pelvis.
+  /// motion, which is more accurate than the direction of the pelvis.
   double displacement_heading_min_m = 0.3;
   /// True: the root of a figure that walks on the spot is moved so that its supporting foot stands
   /// still. False: such captures are rejected.

@@ -21,8 +21,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNoiseRad = 4.0 * kDegree;
 constexpr double kSlopeRadPerS = 50.0 * kDegree;
 constexpr double kOscillationRad = 8.0 * kDegree;
-// Neighbouring frames are strongly correlated, so n frames count as n times this many independent
-// measurements.
+// Neighbouring frames are strongly correlated, so n frames count as only n * kIndependentShare
+// independent measurements.
 constexpr double kIndependentShare = 0.1;
 
 struct StepTime {

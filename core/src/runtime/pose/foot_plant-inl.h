@@ -434,7 +434,7 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   Float flatnesses[2];
   EvaluateLegs(rig, rotations, root_rotation, legs, joints);
   const Mask is_settling = common.plant_fade_s > Float(0.0f);
-  // Fraction of the changes by planting that has faded in (FootPlan::plant_fade_s).
+  // Fraction to which the changes due to planting have faded in (FootPlan::plant_fade_s).
   const Float planted =
       Select(is_settling,
              Float(1.0f) - EaseOut((common.time_s - common.start_offset_s) /
