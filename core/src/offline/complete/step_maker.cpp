@@ -306,9 +306,9 @@ class StepGenerator {
   }
 
   // Returns how far the root is raised in the middle of the step so that the fixed leg bends as in
-  // a blend of the stand and the captured stride. Without this correction, the leg would bend
-  // further in short steps, because a body falls less than in proportion to the length of the step.
-  // Starts and stops are not corrected, because a rise would make the pelvis accelerate more.
+  // a blend of the stand and the captured stride. The path of the root does not depend on the leg,
+  // so in short steps it would bend the leg further. Starts and stops are not corrected, because a
+  // rise would make the pelvis accelerate more.
   [[nodiscard]] double StanceRiseAt(double time_s, const DVec3& root) const {
     const double fade_s = kStanceFade * end_s_;
     const double share = std::min(1.0, ShareAt(time_s));
