@@ -84,7 +84,7 @@ class PlayoutClock {
   double smallest_s_ = 0.0;  ///< Smallest offset in the window.
   double stalled_since_s_ = 0.0;
   double last_on_time_s_ = 0.0;  ///< Local time of the last message that was not too late.
-  /// Local time at which `d` last exceeded its target by at most kMaxExcessS.
+  /// Last local time at which `d` was at most kMaxExcessS above its target.
   double last_short_s_ = 0.0;
   double last_local_s_ = 0.0;
   double at_local_s_ = 0.0;  ///< Local time for which `offset_s_` is valid.

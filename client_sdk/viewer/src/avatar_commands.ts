@@ -91,15 +91,15 @@ export class AvatarCommands {
     });
   }
 
-  /** If this page has changed the terrain, the panel keeps its choice; otherwise it resets it. */
+  /** Resets the panel's choice of terrain, unless this page has changed the terrain itself. */
   onTerrainChanged(world: World): void {
     if (this.terrainRequestedFor !== world) this.host.resetTerrainChoice();
     this.terrainRequestedFor = null;
   }
 
   /**
-   * Must be called with the world that receives commands. If this is another world than before,
-   * resets the panel's choice.
+   * Must be called with the world that receives commands whenever this world may have changed. If
+   * it has, resets the panel's choice of terrain.
    */
   setTerrainChoiceWorld(world: World): void {
     if (world === this.terrainChoiceWorld) return;

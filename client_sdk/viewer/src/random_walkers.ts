@@ -86,7 +86,7 @@ export function randomMovements(
   const dice = random();
   if (dice < 0.08) return [{avatar, type: 'stand', seconds: 0.6 + random() * 1.2}];
   const distanceM = Math.hypot(x, z);
-  // Returns the angle from the heading to the direction of the origin; positive to the left.
+  // Angle from the heading to the direction of the origin, positive to the left.
   let homeRad = Math.atan2(-x, -z) - headingRad;
   homeRad = Math.atan2(Math.sin(homeRad), Math.cos(homeRad));
   const turnRad = distanceM > homeRadiusM ?

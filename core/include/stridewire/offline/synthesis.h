@@ -70,8 +70,8 @@ struct SkippedRequest {
 
 /// Starts, changes or stops a layer when a movement begins.
 struct LayerCue {
-  /// Index of that movement in the list of requests. If it equals the number of requests, the cue
-  /// takes effect after all movements and has no visible effect.
+  /// Index of that movement in the list of requests. The number of requests is allowed as well, but
+  /// such a cue has no visible effect, because no movement follows it.
   std::size_t before = 0;
   std::string layer;  ///< Name of the layer.
   bool enabled = true;

@@ -85,16 +85,20 @@ struct Refinement {
 };
 
 /// Adds pseudoexamples where the error of synthesized movements is largest (paper, Section 4). They
-/// are sites with weights instead of motion:
+/// are sites with weights instead of motion. In the notation of the paper, w(p) are the weights for
+/// the parameters p, a(p) the measured parameters of the movement, and e(p) its error. The paper
+/// repeats these steps until the largest error is below max_error_m, or until the group has
+/// max_pseudoexamples:
 ///
-///   repeat: p^ = argmax e over the hull V of the examples: samples, then steepest ascent
-///           p* with a(p*) = p^ (CorrectWeights); add the site p^ with the weights w(p*); refit
-///   until max e < max_error_m or the number of pseudoexamples is reached
+/// - Find the parameters p^ in the hull of the examples where e is largest, by sampling the hull
+///   and then by steepest ascent.
+/// - Find p* with a(p*) = p^ (CorrectWeights). Add a site at p^ with the weights w(p*), and refit.
 ///
-/// With the bare rule, the radii near a new site shrink, and sometimes the largest error grows. The
-/// amended rule keeps the condition number below kMaxRefinedCondition and the sum of |w| below
-/// kMaxRefinedWeightSum. It runs the following passes until one reaches max_error_m. If none does,
-/// it uses the pass whose largest error, measured with samples of another seed, is smallest.
+/// If this is all (RefineRule::kBare), the radii near a new site shrink, and sometimes the largest
+/// error grows. RefineRule::kAmended keeps the condition number below kMaxRefinedCondition and the
+/// sum of |w| below kMaxRefinedWeightSum. It runs the following passes until one reaches
+/// max_error_m. If none does, it uses the pass whose largest error, measured with samples of
+/// another seed, is smallest.
 ///
 /// 1. The radii of the examples are constant. Sites that do not reduce the error are rejected.
 /// 2. Radii shrink, and every site is added. Finally, the sites added after the best state are

@@ -31,8 +31,11 @@ struct FootPose {
 /// The motion of both feet in a step. The ball of the fixed foot, when flat, is at y = z = 0.
 ///
 ///   fixed   heel pivot | flat ........ | ball pivot .............
-///   moving  ball, tip  | swing ..................... | heel pivot
+///   moving  toe pivot  | swing ..................... | heel pivot
 ///           start    toe-off                    heel-strike    end
+///
+/// "Heel pivot" means that the foot turns about its heel, which stays on the ground. In the toe
+/// pivot, the foot turns about its ball first and about the tip of its toes last.
 class FootPaths {
  public:
   FootPaths(Foot moving, const StepTiming& timing);

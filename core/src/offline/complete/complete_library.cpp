@@ -28,7 +28,7 @@ using complete::Person;
 using complete::StepSpec;
 using complete::StrideModel;
 
-// Maximum tilt of the soles in a stand.
+// Maximum RawLibrary::stand_tilt_m of a stand.
 constexpr double kMaxTiltM = 0.02;
 
 // Collects the names of steps that the captures lack, on one side or on both.

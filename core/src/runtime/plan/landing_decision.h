@@ -7,8 +7,8 @@
 
 namespace stridewire {
 
-/// The decisions of PlanFeet. The rest of the plan follows from them, without the request and the
-/// terrain.
+/// The choices that PlanFeet makes with the request and the terrain. The rest of a plan can be
+/// computed from them, so replicas need neither.
 struct LandingDecision {
   double extra_turn_rad = 0.0;  ///< Movement::extra_turn_rad
   bool is_on_terrain = false;

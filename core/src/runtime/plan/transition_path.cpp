@@ -126,8 +126,8 @@ class TransitionPathFinder {
            (!IsStep(kind) || MovingFoot(kind) == stance.last_moved);
   }
 
-  // Returns the forward distance between the feet and their positions at the start of the
-  // movement's examples.
+  // Returns by how much the forward distance between the feet differs from that at the start of the
+  // planned movement.
   double StartErrorM(const RequestPlan& plan, const Stance& stance) const {
     const MotionGroup& group = library_.group(plan.group);
     const int l = group.FindParameter(ParameterName::kStartZ);

@@ -18,7 +18,7 @@ DVec3 Turn(double sine, double cosine, const DVec3& v) {
 
 void EndPoses::Gradient::Add(int joint, const DVec3& by_xyz, double by_w) {
   const auto j = static_cast<std::size_t>(joint);
-  // The chains of the two legs share their first joints, so an entry may already exist.
+  // The chains of the two legs share the joints near the root, so an entry may already exist.
   std::size_t i = 0;
   while (i < joint_count_ && joints_[i].joint != j) ++i;
   if (i == joint_count_) joints_[joint_count_++] = {j, {}};
