@@ -103,8 +103,8 @@ class Candidates {
 };
 
 struct Deviation {
-  double usual = 0.0;
-  double one = 0.0;  // 1.4826 MAD.
+  double usual = 0.0;  // Median.
+  double one = 0.0;    // Standard deviation, estimated as 1.4826 MAD.
 };
 
 Deviation DeviationOf(const std::vector<double>& values, double least) {

@@ -142,7 +142,8 @@ class BasicStepList {
     for (const double side : {0.0, 1.0, -1.0}) {
       Add("", Feet(0.5 * full(), 0.5 * full(), side * kWalkTurnRad));
     }
-    // After an outward turn, the feet are wider apart than in a walk. The following steps start so.
+    // After an outward turn, the feet are wider apart than in a walk. The following steps start at
+    // this distance.
     for (const double turn_rad : {0.0, kSpotTurnRad, -kSpotTurnRad}) {
       StepFeet feet = Feet(0.0, 0.0, turn_rad);
       feet.start_m.x = SideSign(foot_) * wide_m;

@@ -50,7 +50,8 @@ void BlendFeet(const PostureSample& a, const PostureSample& b, double share_of_b
 /// Returns the position of the root relative to the ground below the midpoint between the balls.
 [[nodiscard]] DVec3 RootFromFeet(const PostureSample& sample);
 
-/// Returns the distance from hip to ankle that a leg has if its ball is where the sample has it.
+/// Returns the distance from hip to ankle with which the ball of the foot is at its position in the
+/// sample.
 [[nodiscard]] double LegLength(const Skeleton& skeleton, const LegRig& rig,
                                const PostureSample& sample, Foot foot);
 

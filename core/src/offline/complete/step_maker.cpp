@@ -43,8 +43,8 @@ constexpr double kSwingEnd = 2.06;
 // SwungAt limits the progress of the foot to that of the captured foot. The limit fades in and out
 // during this fraction of the swing at each end.
 constexpr double kSwingFade = 0.2;
-// Rounds the corner where this limit begins or ceases to apply, as a fraction of the way between
-// the footprints.
+// Size of the rounded corner where this limit begins or ceases to apply, as a fraction of the way
+// between the footprints.
 constexpr double kSwingRounding = 0.02;
 // Minimum weight of the captured stride in the middle of a swing, for the rotation and the height
 // of the foot. It prevents feet from dragging along the ground in short steps.

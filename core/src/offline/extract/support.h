@@ -10,7 +10,8 @@ namespace stridewire {
 ///
 /// - The other foot is higher for a while, so this foot carries the figure alone.
 /// - The foot is as low as the other foot, which stands as well, for a while.
-/// - The pelvis is so close to this foot that the foot must carry a part of the weight.
+/// - Seen from above, the pelvis is so close to this foot that the foot must carry a part of the
+///   weight.
 ///
 /// If feet leave the ground without a fall and come to rest above the floor, the figure hangs, for
 /// example by its arms from a bar. These contacts are removed as well.

@@ -34,7 +34,7 @@ struct RequestTarget {
 inline constexpr double kQuickStepS = 0.5;
 inline constexpr double kHurriedRate = 1.6;
 
-/// How fast movements are played that would take long.
+/// Determines how fast the movements of a request are played if they would take long.
 struct PlaybackPace {
   double max_rate = 1.0;             ///< Maximum playback speed; 1 is that of the examples.
   double long_s = kQuickStepS;       ///< Movements up to this duration are not played faster.
