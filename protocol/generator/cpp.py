@@ -80,7 +80,7 @@ class Cpp:
     # ---- checks
 
     def that(self, condition, at, text, code="OutOfRange", value=None):
-        """A check of one value. `value` is an integer for the error."""
+        """A check of one value. The error contains `value`, an integer, unless it is None."""
         if value is None:
             return f'found.That({condition}, ErrorCode::k{code}, "{text}", {at});'
         code = "" if code == "OutOfRange" else f", ErrorCode::k{code}"
@@ -264,7 +264,7 @@ class Cpp:
         return f"const auto {f.name} = Build(b, {m});"
 
     def build(self, f):
-        """A statement that builds a field which is stored by offset, or a struct; else None."""
+        """A statement that builds a struct, or a field that is stored by offset. Else None."""
         m = self.member(f)
         keep = "true" if "keep_empty" in f else "false"
         if other := f.get("keep_empty"):

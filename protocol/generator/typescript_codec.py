@@ -200,8 +200,8 @@ class TypeScriptCodec(TypeScript):
             line = f"b.addFieldStruct({slot}, wire.{f.type}.create{f.type}(b, ...{value}), 0);"
         else:
             adder = ADDERS["ubyte" if self.enum_of(f) else f.type]
-            # Values equal to this default are not stored. No number equals NaN, so 0 is stored,
-            # too.
+            # Values equal to this default are not stored. No number equals NaN, so with NaN as the
+            # default even 0 is stored.
             initial = "NaN" if f.default == "null" else "0n" if f.type == "ulong" else \
                 self.schema.enums[f.type].values[self.first_value(f)] if self.enum_of(f) else \
                 f.default or 0

@@ -76,7 +76,8 @@ void ReplicaSet::AdvanceDue(const protocol::Movements& message, bool emits, Pose
                              .ticks_apart = static_cast<int>(every_n_ticks)},
                             evaluator_);
   if (!has_poses) return;
-  // The poses and the memory of the sink are in no cache. They are prefetched at this distance.
+  // The poses and the memory of the sink are usually in no processor cache. They are prefetched
+  // this many avatars ahead.
   constexpr std::size_t kPrefetched = 2;
   for (std::size_t i = 0; i < due_.size() + kPrefetched; ++i) {
     if (i < due_.size()) {

@@ -96,7 +96,7 @@ struct ConfigKey {
 [[nodiscard]] const std::vector<ConfigKey>& ConfigKeys();
 
 /// True for the names that the protocol allows: UTF-8 of 1 to kMaxNameBytes bytes without control
-/// characters. A world name must therefore not become part of a file name as it is.
+/// characters. A world name may thus contain slashes, so it must not be used as a file name.
 [[nodiscard]] bool IsWorldName(std::string_view name);
 
 /// Reads TOML text into `config`. Errors contain `name`, which is the file's name, the line and

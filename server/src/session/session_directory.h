@@ -23,7 +23,7 @@ class SessionDirectory {
   };
 
   /// Creates a session on the shard with the fewest sessions. Fails with kLimitReached if there are
-  /// too many sessions in total or of this address; `reached` returns which limit it was.
+  /// too many sessions in total or of this address; `reached` receives the limit.
   [[nodiscard]] Outcome<Entry> Open(const std::string& address, Limit& reached);
 
   /// Returns null if no session has this token.
