@@ -224,7 +224,7 @@ FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
     std::array<BlendedFoot, 2> planned = feet_of_pose();
     for (std::size_t f = 0; f < 2; ++f) {
       planned[f].ball_m +=
-          CorrectFoot(body_.movement, static_cast<Foot>(f), time_s, planned[f]).offset_m;
+          FootOffset(body_.movement, static_cast<Foot>(f), time_s, planned[f].ball_m);
     }
     PlantFeet(rig, body_.movement, time_s, body_.pose);
     const std::array<BlendedFoot, 2> planted = feet_of_pose();

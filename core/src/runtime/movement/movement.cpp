@@ -8,17 +8,6 @@
 #include "runtime/library/keytimes.h"
 
 namespace stridewire {
-double EaseOut(double s) {
-  if (s <= 0.0) return 1.0;
-  if (s >= 1.0) return 0.0;
-  const double r = 1.0 - s;
-  return r * r * (3.0 - 2.0 * r);
-}
-
-double EaseOutSlope(double s) {
-  if (s <= 0.0 || s >= 1.0) return 0.0;
-  return s * (1.0 - s) * (1.0 - s);
-}
 
 void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
                 std::span<double> weight_scratch, Movement& movement) {

@@ -77,11 +77,19 @@ void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& mo
                    double rate = 1.0);
 
 /// f(s) = 3(1-s)^2 - 2(1-s)^3: 1 for s <= 0, 0 for s >= 1.
-[[nodiscard]] double EaseOut(double s);
+[[nodiscard]] inline double EaseOut(double s) {
+  if (s <= 0.0) return 1.0;
+  if (s >= 1.0) return 0.0;
+  const double r = 1.0 - s;
+  return r * r * (3.0 - 2.0 * r);
+}
 
 /// h(s) = s (1-s)^2: zero at both ends, with slope 1 at 0. Together with f it forms the cubic that
 /// has any given value and slope at 0 and ends at rest.
-[[nodiscard]] double EaseOutSlope(double s);
+[[nodiscard]] inline double EaseOutSlope(double s) {
+  if (s <= 0.0 || s >= 1.0) return 0.0;
+  return s * (1.0 - s) * (1.0 - s);
+}
 
 /// Returns the base frame after the movement: below the displayed root at its end, with the heading
 /// turned by the blended change. The paper uses the displayed heading instead. It oscillates with

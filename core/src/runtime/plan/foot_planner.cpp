@@ -1,10 +1,9 @@
-#include "runtime/plan/foot_planner.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/plan/foot_planner.h"
 #include "runtime/plan/foot_sampler.h"
 #include "runtime/plan/sole_levels.h"
 #include "runtime/plan/swing_path.h"
@@ -370,8 +369,7 @@ class Planner {
       const bool stays = trajectory.release_s == FootTrajectory::kNever;
       HeightRange lift{stays ? -kMaxSettleLiftM : 0.0, kMaxSettleLiftM};
       for (std::size_t i = 0; i < times_s.size() && times_s[i] <= trajectory.release_s; ++i) {
-        const BlendedFoot blended{.ball_m = sampler_.Ball(i, foot)};
-        const double raised_m = CorrectFoot(movement_, foot, times_s[i], blended).offset_m.y -
+        const double raised_m = FootOffset(movement_, foot, times_s[i], sampler_.Ball(i, foot)).y -
                                 trajectory.from.position_m.y;
         const double share = SettleLiftShare(1.0 - EaseOut(kSettleSamples[i]));
         lift.min_m = std::max(lift.min_m,
@@ -403,9 +401,8 @@ class Planner {
     for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
       const double part = kSwingSamples[i];
       const double time_s = times_s_[kSwing + i];
-      const BlendedFoot blended{// The heading is not set, because it does not affect the ball.
-                                .ball_m = sampler_.Ball(kSwing + i, moving)};
-      const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
+      const DVec3 blended_m = sampler_.Ball(kSwing + i, moving);
+      const DVec3 ball = blended_m + FootOffset(movement_, moving, time_s, blended_m);
       const DVec3 apart = vector(ball, part);
       if (std::fabs(apart.z) > kPassingLengthM) continue;
       const double lift = 4.0 * part * (1.0 - part);
@@ -540,12 +537,10 @@ class Planner {
     const double from_m = trajectory.from.position_m.y;
     double lift_m = 0.0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      const BlendedFoot blended{.ball_m = sampler_.Ball(first + i, moving)};
-      const FootCorrection correction =
-          CorrectFoot(movement_, moving, times_s_[first + i], blended);
+      const DVec3 offset_m =
+          FootOffset(movement_, moving, times_s_[first + i], sampler_.Ball(first + i, moving));
       const double ground_m = from_m + samples[i] * (trajectory.to.position_m.y - from_m);
-      const double above_m =
-          sampler_.LowestSole(first + i, moving) + correction.offset_m.y - ground_m;
+      const double above_m = sampler_.LowestSole(first + i, moving) + offset_m.y - ground_m;
       lift_m = std::max(lift_m, (clearance_m - above_m) / LiftShare(lift, samples[i]));
     }
     return lift_m;

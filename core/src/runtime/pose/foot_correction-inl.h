@@ -23,6 +23,16 @@ struct TrajectoryOf {
   Number locks_height;  // 1 if FootTrajectory::locks_height, else 0.
 };
 
+// The offset of a foot, and values from which its turn follows as well.
+template <typename Number, typename Vector>
+struct OffsetOf {
+  Vector offset;
+  Number swing;           // As in CorrectionOf.
+  Number settled;         // Fraction of the difference pose that has faded out.
+  Number residual;        // Remaining fraction of the residual.
+  Number residual_slope;  // Factor in seconds of the velocity of the residual.
+};
+
 template <typename Number, typename Vector>
 struct CorrectionOf {
   Vector offset;
@@ -63,10 +73,10 @@ STRIDEWIRE_INLINE Number ExtraTurnAt(const Timing& timing, Number at_s) {
   return timing.extra_turn * (Constant<Number>(1.0) - EaseOut(timing.OfDuration(at_s)));
 }
 
+// Returns the offset of a foot, which does not depend on the heading of the blended foot.
 template <typename Number, typename Vector, typename Timing>
-STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
-    const Timing& timing, const TrajectoryOf<Number, Vector>& trajectory, const Vector& ball,
-    Number heading, Number flatness) {
+STRIDEWIRE_INLINE OffsetOf<Number, Vector> OffsetTrajectory(
+    const Timing& timing, const TrajectoryOf<Number, Vector>& trajectory, const Vector& ball) {
   const Number zero = Constant<Number>(0.0);
   const Number one = Constant<Number>(1.0);
   const Number t = timing.time_s;
@@ -77,8 +87,6 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
       Select(has_landed, one, Select(is_planted, zero, (t - trajectory.release_s) / length));
   const Number r = one - s;
 
-  CorrectionOf<Number, Vector> c;
-  c.swing = s;
   // A planted ball stays on its footprint. A swinging one follows a cubic Hermite curve.
   const Vector print = Select(has_landed, trajectory.to, trajectory.from);
   const Number across = Constant<Number>(4.0) * s * r;
@@ -87,7 +95,7 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
       trajectory.land_offset * (s * s * OnePlusTwice(r)) +
       (trajectory.release_velocity * r - trajectory.land_velocity * s) * (length * s * r) +
       trajectory.mid_swing_offset * (across * across);
-  c.offset = Select(is_planted, print - ball, flying);
+  Vector offset = Select(is_planted, print - ball, flying);
 
   // A foot that steps up rises early in the swing; a foot that steps down descends late.
   const Number since_s = t - timing.start_offset_s;
@@ -98,32 +106,50 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   const Number risen = one - EaseOut(DivideBy(s - rise_start, 1.0 - kSinkStart));
   const auto& level = trajectory.level;
   const Number u = timing.OfDuration(t);
-  const Number locked = Select(trajectory.locks_height > zero, c.offset.y, zero);
-  c.offset.y = locked + height[0] + settled * (height[1] - height[0]) + rise * risen +
-               u * (level[0] + u * (level[1] + u * (level[2] + u * level[3]))) +
-               trajectory.settle_lift * SettleLiftShareOf(settled) +
-               trajectory.lift[0] * LiftShareOf(kLiftCurves[0], s) +
-               trajectory.lift[1] * LiftShareOf(kLiftCurves[1], s) +
-               trajectory.lift[2] * LiftShareOf(kLiftCurves[2], s);
+  const Number locked = Select(trajectory.locks_height > zero, offset.y, zero);
+  offset.y = locked + height[0] + settled * (height[1] - height[0]) + rise * risen +
+             u * (level[0] + u * (level[1] + u * (level[2] + u * level[3]))) +
+             trajectory.settle_lift * SettleLiftShareOf(settled) +
+             trajectory.lift[0] * LiftShareOf(kLiftCurves[0], s) +
+             trajectory.lift[1] * LiftShareOf(kLiftCurves[1], s) +
+             trajectory.lift[2] * LiftShareOf(kLiftCurves[2], s);
+
+  const Number faded = since_s / trajectory.residual_over_s;
+  const Number value = EaseOut(faded);
+  const Number slope = trajectory.residual_over_s * EaseOutSlope(faded);
+  offset =
+      AddBoth(offset, trajectory.residual_offset * value, trajectory.residual_velocity * slope);
+  return {offset, s, settled, value, slope};
+}
+
+template <typename Number, typename Vector, typename Timing>
+STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
+    const Timing& timing, const TrajectoryOf<Number, Vector>& trajectory, const Vector& ball,
+    Number heading, Number flatness) {
+  const Number one = Constant<Number>(1.0);
+  const Number t = timing.time_s;
+  const auto has_landed = t >= trajectory.land_s;
+  const auto is_planted = (t <= trajectory.release_s) || has_landed;
+  const OffsetOf<Number, Vector> at = OffsetTrajectory(timing, trajectory, ball);
+  const Number s = at.swing;
+  CorrectionOf<Number, Vector> c;
+  c.offset = at.offset;
+  c.swing = s;
 
   // The extra turn of the body does not rotate a standing foot. During its swing, the foot turns by
   // the angle by which the body will have turned when the foot lands.
   c.turned = one - EaseOut(s);
   const Number late =
       EaseOut(DivideBy(s - Constant<Number>(kLandingTiltStart), 1.0 - kLandingTiltStart));
+  const Number across = Constant<Number>(4.0) * s * (one - s);
   const Number swung = Select(s > Constant<Number>(0.5), late, across * across);
   c.tilted = one - Constant<Number>(1.0 - kSwingTilt) * swung;
   const auto& turn = trajectory.turn;
-  Number free = turn[0] + settled * (turn[1] - turn[0]) + c.turned * (turn[2] - turn[1]);
+  Number free = turn[0] + at.settled * (turn[1] - turn[0]) + c.turned * (turn[2] - turn[1]);
   free = free + (ExtraTurnAt(timing, Min(trajectory.land_s, timing.duration_s)) * c.turned -
                  ExtraTurnAt(timing, t));
-
-  const Number faded = since_s / trajectory.residual_over_s;
-  const Number value = EaseOut(faded);
-  const Number slope = trajectory.residual_over_s * EaseOutSlope(faded);
-  c.offset =
-      AddBoth(c.offset, trajectory.residual_offset * value, trajectory.residual_velocity * slope);
-  free = AddBoth(free, value * trajectory.residual_turn, slope * trajectory.residual_turn_s);
+  free = AddBoth(free, at.residual * trajectory.residual_turn,
+                 at.residual_slope * trajectory.residual_turn_s);
   c.free_turn = free;
 
   // The heading of a standing foot is locked while its sole is on the ground, and free with the

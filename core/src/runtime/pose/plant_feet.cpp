@@ -133,6 +133,12 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
           .root_shift_m = c.root_shift};
 }
 
+DVec3 FootOffset(const Movement& movement, Foot foot, double time_s, const DVec3& ball_m) {
+  return OffsetTrajectory<double, DVec3>(Timing(movement, time_s),
+                                         TrajectoryFor(movement.feet, foot), ball_m)
+      .offset;
+}
+
 FeetCorrection CorrectFeet(const Movement& movement, double time_s, const FeetAt& blended) {
   FeetCorrection corrections;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

@@ -52,6 +52,11 @@ struct FootCorrection {
 [[nodiscard]] FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
                                          const BlendedFoot& blended);
 
+/// Returns FootCorrection::offset_m of a foot whose blended ball is at `ball_m`. This is faster than
+/// CorrectFoot.
+[[nodiscard]] DVec3 FootOffset(const Movement& movement, Foot foot, double time_s,
+                               const DVec3& ball_m);
+
 /// Corrections of both feet, and the resulting shift of the root.
 struct FeetCorrection {
   std::array<FootCorrection, 2> feet;  ///< [foot]
