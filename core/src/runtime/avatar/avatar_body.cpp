@@ -27,6 +27,10 @@ AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of_library)
 
 void AvatarBody::Evaluate(double time_s) {
   GridCache cache(library->layout());
+  EvaluateWith(cache, time_s);
+}
+
+void AvatarBody::EvaluateWith(GridCache& cache, double time_s) {
   EvaluateMovement(group(), library->layout(), movement, time_s, cache, blended_pose);
   pose = blended_pose;
   PlantFeet(library->leg_rig(), movement, time_s, pose);
@@ -39,13 +43,14 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
                ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended)
                : FeetCorrection{};
   };
+  // Both poses usually lie between the same grid points.
+  GridCache cache(library->layout());
   if (keeps_speed) {
     const double earlier_s = time_s - kBlendStepS;
-    GridCache cache(library->layout());
     EvaluateMovement(group(), library->layout(), movement, earlier_s, cache, earlier_pose);
     earlier_feet[1] = corrections(earlier_s, earlier_pose);
   }
-  Evaluate(time_s);
+  EvaluateWith(cache, time_s);
   earlier_feet[0] = corrections(time_s, blended_pose);
   // If planting has not completely faded in, the next movement starts the fade-in again.
   begins_planting =

@@ -70,6 +70,7 @@ struct AvatarBody {
   void ApplyLayers();
 
  private:
+  void EvaluateWith(GridCache& cache, double time_s);
   void ContinueFeet(bool keeps_speed, const std::array<FeetAt, 2>& blended);
   template <typename Landing>
   void BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScratch& scratch);

@@ -30,16 +30,11 @@ Vec3 RotationVector(const Quat& q) {
 
 }  // namespace
 
-std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const float> weights,
-                                      int point) {
-  const std::size_t slot = static_cast<std::size_t>(point) & (slot_count_ - 1);
-  const std::span<float> row = std::span(rows_).subspan(slot * row_floats_, row_floats_);
-  if (points_[slot] == point) return row;
-  points_[slot] = point;
+void GridCache::SumExamples(const MotionGroup& group, std::span<const float> weights, int point,
+                            float* row) const {
   const std::size_t n = weights.size();
   const float* examples = &group.grid[static_cast<std::size_t>(point) * n * row_floats_];
-  kernels::SumRows(examples, weights.data(), n, row_floats_, row.data());
-  return row;
+  kernels::SumRows(examples, weights.data(), n, row_floats_, row);
 }
 
 void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const Movement& movement,

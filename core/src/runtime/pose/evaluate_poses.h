@@ -27,9 +27,20 @@ class GridCache {
 
   /// Returns the weighted sum at a grid point. Its quaternions are not normalized.
   [[nodiscard]] std::span<const float> Row(const MotionGroup& group, std::span<const float> weights,
-                                           int point);
+                                           int point) {
+    const std::size_t slot = static_cast<std::size_t>(point) & (slot_count_ - 1);
+    float* row = &rows_[slot * row_floats_];
+    if (points_[slot] != point) {
+      points_[slot] = point;
+      SumExamples(group, weights, point, row);
+    }
+    return {row, row_floats_};
+  }
 
  private:
+  void SumExamples(const MotionGroup& group, std::span<const float> weights, int point,
+                   float* row) const;
+
   // Maximum number of cached grid points. It is sufficient for all points of most movements. If
   // rows have the maximum length, only the four points around a time fit.
   static constexpr std::size_t kMaxSlots = 32;
