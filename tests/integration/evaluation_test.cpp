@@ -126,6 +126,7 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
                                           << look << ", " << hwy::TargetName(set));
         plan_scratch.cache().Clear();
         FootSampler sampler(plan_scratch, scratch);
+        sampler.SetDifference(movement);
         sampler.Sample(movement, times_s, eased);
         GridCache own(library->layout());
         for (std::size_t i = 0; i < times_s.size(); ++i) {

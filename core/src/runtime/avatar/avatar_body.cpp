@@ -96,12 +96,14 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScr
   GridCache& cache = scratch.cache();
   cache.Clear();
   if (plants_feet) {
+    TransitionSamples transition(scratch, pose);
     const FootPlanJob job{.library = *library,
                           .locks = locks,
                           .source = {blended_pose, earlier},
                           .scratch = scratch,
                           .pose = pose,
-                          .movement = movement};
+                          .movement = movement,
+                          .transition = transition};
     ContinueFeet(keeps_speed, PlanFeet(job, landing));
     PlanRootApproach(job);
     LiftWhileSettling(job);

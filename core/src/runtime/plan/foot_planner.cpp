@@ -1,12 +1,14 @@
+#include "runtime/plan/foot_planner.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
-#include "runtime/plan/foot_planner.h"
 #include "runtime/plan/foot_sampler.h"
 #include "runtime/plan/sole_levels.h"
 #include "runtime/plan/swing_path.h"
+#include "runtime/plan/transition_samples.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/foot_plant_constants.h"
@@ -61,15 +63,9 @@ constexpr double kMaxPushM = 0.08;
 constexpr std::array<double, 2> kEarlySamples{0.1, 0.18};
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
-// The moving foot is also sampled at these fractions of the time before its release, and at these
-// fractions of its swing, shortly before the landing.
-constexpr std::array<double, 2> kReleaseSamples{0.6, 0.8};
-constexpr std::array<double, 3> kLandingSamples{0.9, 0.94, 0.97};
 // A landing foot may briefly be this far below the ground.
 constexpr double kMaxLandingSinkM = 0.008;
 
-// Fractions of the blend-in at which standing feet are sampled.
-constexpr std::array<double, 7> kSettleSamples{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
 // While the difference pose fades out, standing feet are lifted by at most this.
 constexpr double kMaxSettleLiftM = 0.05;
 
@@ -90,7 +86,7 @@ class Planner {
         pose_(job.pose),
         movement_(job.movement),
         sampler_(job.scratch, job.pose),
-        contact_sampler_(job.scratch, job.pose) {}
+        transition_(job.transition) {}
 
   FeetAt FeetOf(ConstPoseSpan pose) const {
     FeetAt feet;
@@ -121,17 +117,8 @@ class Planner {
     times_s_[kEntry] = movement_.start_offset_s;
     times_s_[kEntry + 1] = movement_.start_offset_s + kBlendStepS;
     times_s_[kBlendedEnd] = movement_.duration_s();
+    sampler_.SetDifference(movement_);
     sampler_.Sample(movement_, times_s_, kBlendedEnd);
-    for (std::size_t i = 0; i < kReleaseSamples.size(); ++i) {
-      contact_times_s_[kStandingLate + i] =
-          movement_.start_offset_s +
-          kReleaseSamples[i] * std::max(0.0, swing.release_s - movement_.start_offset_s);
-    }
-    for (std::size_t i = 0; i < kLandingSamples.size(); ++i) {
-      contact_times_s_[kLandingSoon + i] =
-          swing.release_s + kLandingSamples[i] * (swing.land_s - swing.release_s);
-    }
-    contact_sampler_.Sample(movement_, contact_times_s_, contact_times_s_.size());
   }
   FeetAt KeyPoseAt(std::size_t time) const {
     return {sampler_.FootAt(time, Foot::kLeft), sampler_.FootAt(time, Foot::kRight)};
@@ -252,9 +239,10 @@ class Planner {
     const double at_landing_m = sampler_.LowestSole(kLanding, moving) - ground_m;
     const double at_end_m = sampler_.LowestSole(kBlendedEnd, moving) - ground_m;
     double lowest_m = std::min(at_landing_m, at_end_m);
-    for (std::size_t i = 0; i < kLandingSamples.size(); ++i) {
-      lowest_m = std::min(lowest_m, contact_sampler_.LowestFlatSole(kLandingSoon + i, moving) -
-                                        ground_m + kMaxLandingSinkM - kMaxSinkM);
+    for (std::size_t i = 0; i < TransitionSamples::kLandingSamples.size(); ++i) {
+      const double sole_m =
+          transition_.feet().LowestFlatSole(TransitionSamples::kLanding + i, moving);
+      lowest_m = std::min(lowest_m, sole_m - ground_m + kMaxLandingSinkM - kMaxSinkM);
     }
     const HeightRange lowest = LevellingRange(lowest_m);
     const HeightRange highest = LevellingRange(std::max(at_landing_m, at_end_m));
@@ -288,15 +276,16 @@ class Planner {
     const double height_m = start_m + settled * (settled_m - start_m);
     double raise_m = Levelling(sampler_.LowestSole(kRelease, moving) + height_m - ground_m) /
                      std::max(settled, kLeastSettled);
-    for (std::size_t i = 0; i < kReleaseSamples.size(); ++i) {
-      const double settled_i = settled_at(contact_times_s_[kStandingLate + i]);
+    for (std::size_t i = 0; i < TransitionSamples::kReleaseSamples.size(); ++i) {
+      const std::size_t at = TransitionSamples::kRelease + i;
+      const double settled_i = settled_at(transition_.time_s(at));
       if (settled_i < kMostlySettled) continue;
       const double before_m = start_m + settled_i * (settled_m - start_m);
       const double base_m = before_m - ground_m;
       const double least_m =
-          LevellingRange(contact_sampler_.LowestFlatSole(kStandingLate + i, moving) + base_m).min_m;
+          LevellingRange(transition_.feet().LowestFlatSole(at, moving) + base_m).min_m;
       const double most_m =
-          LevellingRange(contact_sampler_.LowestSole(kStandingLate + i, moving) + base_m).max_m;
+          LevellingRange(transition_.feet().LowestSole(at, moving) + base_m).max_m;
       raise_m = std::clamp(raise_m, std::min(least_m, most_m), most_m);
     }
     // If the blend-in ends before the release, the foot reaches its new height while its heel is
@@ -359,23 +348,22 @@ class Planner {
   // Lifts standing feet so that their balls and ankles do not sink into level ground while the
   // difference pose fades out. The lift is limited so that soles do not hover.
   void LiftWhileSettling() {
-    std::array<double, kSettleSamples.size()> times_s;
-    for (std::size_t i = 0; i < times_s.size(); ++i) {
-      times_s[i] = movement_.start_offset_s + kSettleSamples[i] * movement_.ease_out_s;
-    }
-    sampler_.Sample(movement_, times_s, times_s.size());
+    const FootSampler& feet = transition_.feet();
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       FootTrajectory& trajectory = movement_.feet.foot(foot);
       const bool stays = trajectory.release_s == FootTrajectory::kNever;
       HeightRange lift{stays ? -kMaxSettleLiftM : 0.0, kMaxSettleLiftM};
-      for (std::size_t i = 0; i < times_s.size() && times_s[i] <= trajectory.release_s; ++i) {
-        const double raised_m = FootOffset(movement_, foot, times_s[i], sampler_.Ball(i, foot)).y -
+      for (std::size_t i = 0; i < TransitionSamples::kSettleSamples.size(); ++i) {
+        const std::size_t at = TransitionSamples::kSettle + i;
+        const double time_s = transition_.time_s(at);
+        if (time_s > trajectory.release_s) break;
+        const double raised_m = FootOffset(movement_, foot, time_s, feet.Ball(at, foot)).y -
                                 trajectory.from.position_m.y;
-        const double share = SettleLiftShare(1.0 - EaseOut(kSettleSamples[i]));
-        lift.min_m = std::max(lift.min_m,
-                              (-kMaxSinkM - raised_m - sampler_.LowestFlatSole(i, foot)) / share);
+        const double share = SettleLiftShare(1.0 - EaseOut(TransitionSamples::kSettleSamples[i]));
+        lift.min_m =
+            std::max(lift.min_m, (-kMaxSinkM - raised_m - feet.LowestFlatSole(at, foot)) / share);
         lift.max_m =
-            std::min(lift.max_m, (kMaxHoverM - raised_m - sampler_.LowestSole(i, foot)) / share);
+            std::min(lift.max_m, (kMaxHoverM - raised_m - feet.LowestSole(at, foot)) / share);
       }
       // If the foot would sink with one lift and hover with another, prefers the smaller lift.
       const auto [least, most] = std::minmax(lift.min_m, lift.max_m);
@@ -554,7 +542,7 @@ class Planner {
   PoseSpan pose_;
   Movement& movement_;
   FootSampler sampler_;
-  FootSampler contact_sampler_;     // Samples at contact_times_s_.
+  const TransitionSamples& transition_;
   std::array<Quartic, 2> level_{};  // [foot]
 
   // Indices of the times that SampleKeyPoses samples. For velocities, the times before and after
@@ -569,11 +557,6 @@ class Planner {
   static constexpr std::size_t kBlendedEnd = kEntry + 2;
   static_assert(kBlendedEnd < FootSampler::kMaxTimes);
   std::array<double, kBlendedEnd + 1> times_s_;
-  // First indices in contact_times_s_ of the times before the moving foot leaves the ground, and of
-  // those shortly before it lands.
-  static constexpr std::size_t kStandingLate = 0;
-  static constexpr std::size_t kLandingSoon = kReleaseSamples.size();
-  std::array<double, kReleaseSamples.size() + kLandingSamples.size()> contact_times_s_;
 };
 
 }  // namespace
@@ -585,7 +568,7 @@ namespace {
 // same plan, because it uses the same code.
 std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
                            const LandingDecision& decision) {
-  const auto& [library, locks, source, scratch, pose, movement] = job;
+  const auto& [library, locks, source, scratch, pose, movement, transition] = job;
   const MotionGroup& group = library.group(movement.group);
   STRIDEWIRE_CHECK(&scratch.library() == &library && library.leg_rig().is_usable);
   Planner planner(job);
@@ -623,11 +606,16 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
                           pose, movement);
   }
   planner.SampleKeyPoses(times);
+  const bool is_on_terrain =
+      target == nullptr ? decision.is_on_terrain : target->terrain != nullptr;
+  if (group.kind != MovementKind::kStand) {
+    transition.Sample(movement, times, is_step && !is_on_terrain);
+  }
 
   FootPlan& plan = movement.feet;
   plan = {};
   plan.is_active = true;
-  plan.keeps_above_ground = target == nullptr ? decision.is_on_terrain : target->terrain != nullptr;
+  plan.keeps_above_ground = is_on_terrain;
   for (std::size_t f = 0; f < 2; ++f) {
     FootTrajectory& trajectory = plan.feet[f];
     const FootLock& lock = locks[f];

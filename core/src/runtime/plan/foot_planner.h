@@ -8,6 +8,7 @@
 #include "runtime/plan/plan_scratch.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/plan/swing_times.h"
+#include "runtime/plan/transition_samples.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/leg_rig.h"
@@ -50,6 +51,8 @@ struct FootPlanJob {
   FootPlanScratch& scratch;
   PoseSpan pose;       ///< Scratch memory with one rotation per joint.
   Movement& movement;  ///< Movement to plan. Its weights and heading must be set.
+  /// Set by PlanFeet, except for stands. The functions that complete the plan read it.
+  TransitionSamples& transition;
 };
 
 /// Plans the feet of a movement. Sets `movement.feet`, the base position and the difference pose

@@ -15,7 +15,8 @@ namespace {
 constexpr std::size_t kBlock = kernels::kBlock;
 }
 
-// Arrays for evaluating one movement at several times, with one time per lane.
+// Arrays for evaluating one movement at several times, with one time per lane. SetDifference sets
+// those of the difference pose.
 struct FootSamplerLanes {
   static constexpr std::size_t kJoints = LegRig::kMaxJointsOfLegs;
   kernels::GridTimes times{};
@@ -55,11 +56,13 @@ void SampleGrids(const MotionGroup& group, const Movement& movement,
   kernels::ComputeGridSamples(times_s.size(), lanes.times, lanes.samples);
 }
 
-// Extracts the difference pose of the joints of the legs.
-void CollectDifferences(const Movement& movement, std::span<const int> joints, std::size_t count,
-                        FootSamplerLanes& lanes) {
+}  // namespace
+
+void FootSampler::SetDifference(const Movement& movement) {
   const Pose& difference = movement.difference;
   const auto& velocity = movement.difference_velocity;
+  const std::span<const int> joints = library_.leg_rig().joints;
+  FootSamplerLanes& lanes = scratch_.lanes();
   for (std::size_t j = 0; j < joints.size(); ++j) {
     const Quat& q = difference.rotations[static_cast<std::size_t>(joints[j])];
     float* to = lanes.differences + j * 4 * kBlock;
@@ -79,13 +82,11 @@ void CollectDifferences(const Movement& movement, std::span<const int> joints, s
          movement.is_inertial ? velocity.root_m_s[static_cast<int>(c)] : 0.0f);
   }
   Fill(lanes.is_inertial, movement.is_inertial ? 1.0f : 0.0f);
-  kernels::PrepareDifferences(lanes.differences, joints.size(), count, lanes.ease);
+  kernels::PrepareDifferences(lanes.differences, joints.size(), kBlock, lanes.ease);
   if (movement.is_inertial) {
-    kernels::FindLargestVelocities(lanes.velocity, joints.size(), count, lanes.fastest);
+    kernels::FindLargestVelocities(lanes.velocity, joints.size(), kBlock, lanes.fastest);
   }
 }
-
-}  // namespace
 
 void FootSampler::Sample(const Movement& movement, std::span<const double> times_s,
                          std::size_t eased) {
@@ -107,7 +108,6 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
   std::fill(lanes.samples.is_eased + eased, lanes.samples.is_eased + kBlock, 0.0f);
   const bool is_eased = std::ranges::any_of(std::span(lanes.samples.is_eased).first(eased),
                                             [](float lane) { return lane > 0.0f; });
-  if (is_eased) CollectDifferences(movement, joints, times_s.size(), lanes);
 
   std::array<const float*, kBlock> rows;
   rows.fill(lanes.rows[0]);

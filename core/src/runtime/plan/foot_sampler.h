@@ -25,9 +25,13 @@ class FootSampler {
   FootSampler(FootPlanScratch& scratch, PoseSpan pose)
       : library_(scratch.library()), scratch_(scratch), pose_(pose) {}
 
+  /// Sets the difference pose for Sample. All samplers that use this scratch memory share it. Call
+  /// it again when the difference pose has changed.
+  void SetDifference(const Movement& movement);
+
   /// Samples a movement at up to kMaxTimes times: the first `eased` of them with the difference
   /// pose, as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache
-  /// may only contain rows of this movement.
+  /// may only contain rows of this movement. If `eased` is not 0, SetDifference must precede it.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
   /// Returns the root at time `i`, in world space.

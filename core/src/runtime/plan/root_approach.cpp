@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "runtime/library/locomotion_profile.h"
-#include "runtime/plan/foot_sampler.h"
+#include "runtime/plan/transition_samples.h"
 
 namespace stridewire {
 namespace {
@@ -80,22 +80,21 @@ void PlanRootApproach(const FootPlanJob& job) {
   if (!plan.is_active || job.library.group(movement.group).kind == MovementKind::kStand) return;
   const double start_s = movement.start_offset_s;
   const double ease_out_s = movement.ease_out_s;
-  FootSampler sampler(job.scratch, job.pose);
-  const double step_s = std::min(kBlendStepS, 0.5 * ease_out_s);
-  // Samples the movement with the difference pose, and then without it.
-  sampler.Sample(movement, std::array{start_s, start_s + step_s, start_s, start_s + step_s}, 2);
+  const TransitionSamples& samples = job.transition;
+  const std::size_t eased = TransitionSamples::kStart;
+  const std::size_t blended = samples.blended_start();
   const auto above_feet = [&](std::size_t i) {
-    DVec3 root = sampler.Root(i);
+    DVec3 root = samples.feet().Root(i);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      root -= plan.foot(foot).root_weight * sampler.Ball(i, foot);
+      root -= plan.foot(foot).root_weight * samples.feet().Ball(i, foot);
     }
     return root;
   };
   // On terrain, the approach includes the height if the root has to rise. Otherwise, the legs of an
   // avatar that has climbed would straighten while the difference pose fades out.
-  const bool rises = plan.keeps_above_ground && above_feet(0).y < above_feet(2).y;
+  const bool rises = plan.keeps_above_ground && above_feet(eased).y < above_feet(blended).y;
   const auto offset_at = [&](std::size_t i) {
-    DVec3 offset = above_feet(i) - above_feet(i + 2);
+    DVec3 offset = above_feet(eased + i) - above_feet(blended + i);
     if (!rises) offset.y = 0.0;
     return offset;
   };
@@ -103,8 +102,8 @@ void PlanRootApproach(const FootPlanJob& job) {
   DVec3 offset_m_s(0.0);
   if (movement.is_inertial) {
     const DVec3 next_m = offset_at(1);
-    const double eased = step_s / ease_out_s;
-    offset_m_s = (next_m - EaseOut(eased) * offset_m) / (ease_out_s * EaseOutSlope(eased));
+    const double part = samples.start_step_s() / ease_out_s;
+    offset_m_s = (next_m - EaseOut(part) * offset_m) / (ease_out_s * EaseOutSlope(part));
   }
   const double longest_s = plan.keeps_above_ground                     ? kMaxTerrainApproachS
                            : IsStride(plan, movement.base.heading_rad) ? kMaxStrideApproachS
