@@ -245,14 +245,26 @@ class StepPlanner {
   bool Carries(Foot foot, const Footprint& print) const {
     return Carries(SupportOf(*terrain_, library_.leg_rig().side(foot), print));
   }
+  bool Carries(const Footprint& print) { return Carries(SupportAt(print)); }
+
+  // Returns the support of the moving foot. Remembers it, because several checks need the support
+  // of the same footprint.
+  const FootSupport& SupportAt(const Footprint& print) {
+    if (!supported_ || supported_->foot != moving_ ||
+        supported_->print.position_m != print.position_m ||
+        supported_->print.heading_rad != print.heading_rad) {
+      supported_ =
+          Supported{moving_, print, SupportOf(*terrain_, library_.leg_rig().side(moving_), print)};
+    }
+    return supported_->support;
+  }
 
   // Returns the carried fraction of a sole that may overhang the tread below it. Returns 0 if the
   // tread does not carry enough of the sole.
-  [[nodiscard]] double CarriedByTread(const Footprint& print) const {
-    const LegRig::Side& side = library_.leg_rig().side(moving_);
-    const FootSupport whole = SupportOf(*terrain_, side, print);
+  [[nodiscard]] double CarriedByTread(const Footprint& print) {
+    const FootSupport& whole = SupportAt(print);
     if (whole.rise_m > kHighestRiseM) return 0.0;
-    Sole bearing = SoleOf(side);
+    Sole bearing = SoleOf(library_.leg_rig().side(moving_));
     bearing.heel_m *= kBearingHeel;
     bearing.toe_m *= kBearingToes;
     const FootSupport support =
@@ -282,8 +294,8 @@ class StepPlanner {
   }
 
   // Returns true if the ground carries the sole or, on a short tread, enough of it.
-  [[nodiscard]] bool CarriesOrOverhangs(const Footprint& print) const {
-    return Carries(moving_, print) || (CarriedByTread(print) > 0.0 && IsOnShortTread(print));
+  [[nodiscard]] bool CarriesOrOverhangs(const Footprint& print) {
+    return Carries(print) || (CarriedByTread(print) > 0.0 && IsOnShortTread(print));
   }
 
   // Returns true if the ground does not rise abruptly right in front of the toes or behind the
@@ -306,7 +318,7 @@ class StepPlanner {
   // Returns the footprint, moved forward or backward if its toes or heel would touch a riser and
   // the tread has room for that. On a tread that is too short for the foot, moves the footprint to
   // where the tread carries most of the sole.
-  Footprint WithRoom(const Footprint& print) const {
+  Footprint WithRoom(const Footprint& print) {
     const bool is_on_short_tread = IsOnShortTread(print);
     if (!is_on_short_tread && HasRoom(print)) return print;
     Footprint best = print;
@@ -316,7 +328,7 @@ class StepPlanner {
       moved.position_m += RotateYaw(print.heading_rad, DVec3(0.0, 0.0, shift_m));
       if (!HasRoom(moved)) continue;
       if (!is_on_short_tread) {
-        if (Carries(moving_, moved)) return moved;
+        if (Carries(moved)) return moved;
         continue;
       }
       const double carried = CarriedByTread(moved);
@@ -327,20 +339,17 @@ class StepPlanner {
     return best;
   }
 
-  [[nodiscard]] bool IsSloped(const Footprint& print) const {
-    const FootSupport support = SupportOf(*terrain_, library_.leg_rig().side(moving_), print);
-    return support.normal.y < kSlopeNormalY;
-  }
-
   // Returns the footprint. If the step would climb or descend more than is easy, moves the
   // footprint back towards the standing foot: onto a tread in between or, if there is none and the
   // step is long, to the ground in front of the edge.
-  Footprint WithEasyClimb(const Footprint& print) const {
+  Footprint WithEasyClimb(const Footprint& print) {
     const auto climb_m = [&](const Footprint& at) {
       return terrain_->HeightAt(at.position_m.x, at.position_m.z) - fixed_m_.y;
     };
     const double full_m = climb_m(print);
-    const double easy_m = IsSloped(print) ? kEasySlopeClimbM : kEasyClimbM;
+    if (std::fabs(full_m) <= std::min(kEasyClimbM, kEasySlopeClimbM)) return print;
+    const bool is_sloped = SupportAt(print).normal.y < kSlopeNormalY;
+    const double easy_m = is_sloped ? kEasySlopeClimbM : kEasyClimbM;
     if (std::fabs(full_m) <= easy_m) return print;
     const double ahead_m = RotateYaw(-print.heading_rad, print.position_m - fixed_m_).z;
     std::optional<Footprint> before_edge;
@@ -444,6 +453,12 @@ class StepPlanner {
   int candidates_ = 0;
   bool has_seen_bad_ground_ = false;
   bool has_seen_heights_ = false;
+  struct Supported {
+    Foot foot;
+    Footprint print;
+    FootSupport support;
+  };
+  std::optional<Supported> supported_;  // Result of the last SupportAt.
 };
 
 WalkStance After(const WalkStance& stance, const PlannedStep& step) {

@@ -36,7 +36,7 @@ class SolePoints {
   SolePoint& ball() { return at(kHeelRows, kBallColumn); }
   [[nodiscard]] auto begin() const { return points_.begin(); }
   [[nodiscard]] auto end() const { return points_.end(); }
-  [[nodiscard]] static constexpr double size() { return kRows * kColumns; }
+  [[nodiscard]] static constexpr int size() { return kRows * kColumns; }
 
   // Marks the points that are connected to the ball by slopes within the limit. Passes over all
   // points until nothing changes: twice on ordinary ground, and at most once per point.
@@ -140,9 +140,16 @@ FootSupport SupportOf(const Terrain& terrain, double x, double z, double heading
           false};
     }
   }
-  points.Spread();
   const double ball_height = points.ball().height;
-  const Plane plane = FitPlane(points, ball_height);
+  const bool is_level = std::ranges::all_of(
+      points, [&](const SolePoint& point) { return point.height == ball_height; });
+  Plane plane;
+  if (is_level) {
+    plane.count = SolePoints::size();
+  } else {
+    points.Spread();
+    plane = FitPlane(points, ball_height);
+  }
 
   FootSupport support;
   support.ground_height_m = ball_height;
@@ -154,7 +161,7 @@ FootSupport SupportOf(const Terrain& terrain, double x, double z, double heading
     support.rise_m = std::max(support.rise_m, above);
     support.gap_m = std::max(support.gap_m, -above);
   }
-  support.carried = plane.count / SolePoints::size();
+  support.carried = static_cast<double>(plane.count) / SolePoints::size();
   const double slope_x = plane.side_slope * cosine + plane.forward_slope * sine;
   const double slope_z = plane.forward_slope * cosine - plane.side_slope * sine;
   const double length = std::sqrt(slope_x * slope_x + 1.0 + slope_z * slope_z);
