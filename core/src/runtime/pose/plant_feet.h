@@ -52,7 +52,7 @@ struct FootCorrection {
 [[nodiscard]] FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
                                          const BlendedFoot& blended);
 
-/// Returns FootCorrection::offset_m of a foot whose blended ball is at `ball_m`. This is faster than
+/// Returns FootCorrection::offset_m of a foot whose blended ball is at `ball_m`. Faster than
 /// CorrectFoot.
 [[nodiscard]] DVec3 FootOffset(const Movement& movement, Foot foot, double time_s,
                                const DVec3& ball_m);
