@@ -20,24 +20,28 @@
 namespace stridewire {
 namespace {
 
-constexpr std::size_t kMaxCorral = kMaxParameters + 1;
 constexpr int kMaxRounds = 200;
 // Number of vertices that are stored. Larger groups are rare.
 constexpr std::size_t kMaxStoredVertices = 256;
 constexpr double kInside = 1e-9;
 
-using Point = std::array<double, kMaxParameters>;
+// The number of dimensions `D` is a template argument, so that the compiler unrolls the many short
+// loops over it.
+template <std::size_t D>
+using Point = std::array<double, D>;
 
-double DotProduct(const Point& a, const Point& b, std::size_t d) {
+template <std::size_t D>
+double DotProduct(const Point<D>& a, const Point<D>& b) {
   double sum = 0.0;
-  for (std::size_t l = 0; l < d; ++l) sum += a[l] * b[l];
+  for (std::size_t l = 0; l < D; ++l) sum += a[l] * b[l];
   return sum;
 }
 
+template <std::size_t D>
 struct Corral {
   std::size_t size = 0;
-  std::array<Point, kMaxCorral> points{};
-  std::array<double, kMaxCorral> lambda{};  // Weights of the points: >= 0, sum 1.
+  std::array<Point<D>, D + 1> points{};
+  std::array<double, D + 1> lambda{};  // Weights of the points: >= 0, sum 1.
 
   void Remove(std::size_t i) {
     --size;
@@ -51,12 +55,13 @@ struct Corral {
 // Computes the weights (of any sign, sum 1) of the point of smallest norm in the affine hull of the
 // corral. Solves (1 1^T + P P^T) v = 1 by Gaussian elimination with pivoting; the weights are v /
 // sum v. Returns false if the system is singular.
-bool AffineMinimum(const Corral& corral, std::size_t d, std::array<double, kMaxCorral>& weights) {
+template <std::size_t D>
+bool AffineMinimum(const Corral<D>& corral, std::array<double, D + 1>& weights) {
   const std::size_t n = corral.size;
-  std::array<std::array<double, kMaxCorral + 1>, kMaxCorral> m{};
+  std::array<std::array<double, D + 2>, D + 1> m;
   for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j) {
-      m[i][j] = 1.0 + DotProduct(corral.points[i], corral.points[j], d);
+    for (std::size_t j = 0; j <= i; ++j) {
+      m[i][j] = m[j][i] = 1.0 + DotProduct<D>(corral.points[i], corral.points[j]);
     }
     m[i][n] = 1.0;
   }
@@ -84,33 +89,31 @@ bool AffineMinimum(const Corral& corral, std::size_t d, std::array<double, kMaxC
   return true;
 }
 
-}  // namespace
-
-double ProjectOntoHull(std::span<const double> points, std::span<const double> metric,
-                       double growth, std::span<const double> target, std::span<double> nearest) {
-  const std::size_t d = metric.size();
-  STRIDEWIRE_CHECK(d >= 1 && d <= kMaxParameters && points.size() >= d && points.size() % d == 0);
-  const std::size_t count = points.size() / d;
+template <std::size_t D>
+double Project(std::span<const double> points, std::span<const double> metric, double growth,
+               std::span<const double> target, std::span<double> nearest) {
+  STRIDEWIRE_CHECK(points.size() >= D && points.size() % D == 0);
+  const std::size_t count = points.size() / D;
   STRIDEWIRE_CHECK(count <= MotionLibrary::kMaxExamples);
 
-  Point sum{};
+  Point<D> sum{};
   for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t l = 0; l < d; ++l) sum[l] += points[i * d + l];
+    for (std::size_t l = 0; l < D; ++l) sum[l] += points[i * D + l];
   }
-  Point mean{};
-  for (std::size_t l = 0; l < d; ++l) mean[l] = sum[l] / static_cast<double>(count);
+  Point<D> mean{};
+  for (std::size_t l = 0; l < D; ++l) mean[l] = sum[l] / static_cast<double>(count);
   // Vertices relative to the target, multiplied by the metric. The first ones are stored. The
   // others are computed when they are needed, so that large groups need no more stack than small
   // ones.
   const auto compute_vertex = [&](std::size_t i) {
-    Point vertex{};
-    for (std::size_t l = 0; l < d; ++l) {
-      const double grown = mean[l] + (1.0 + growth) * (points[i * d + l] - mean[l]);
+    Point<D> vertex{};
+    for (std::size_t l = 0; l < D; ++l) {
+      const double grown = mean[l] + (1.0 + growth) * (points[i * D + l] - mean[l]);
       vertex[l] = (grown - target[l]) * metric[l];
     }
     return vertex;
   };
-  std::array<Point, kMaxStoredVertices> stored;
+  std::array<Point<D>, kMaxStoredVertices> stored;
   const std::size_t stored_count = std::min(count, kMaxStoredVertices);
   for (std::size_t i = 0; i < stored_count; ++i) stored[i] = compute_vertex(i);
   const auto vertex_at = [&](std::size_t i) {
@@ -128,20 +131,20 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
   };
 
   const auto start =
-      find_least([&](const Point& vertex) { return DotProduct(vertex, vertex, d); }).first;
-  Corral corral;
+      find_least([&](const Point<D>& vertex) { return DotProduct<D>(vertex, vertex); }).first;
+  Corral<D> corral;
   corral.size = 1;
   corral.points[0] = vertex_at(start);
   corral.lambda[0] = 1.0;
-  Point x = corral.points[0];
+  Point<D> x = corral.points[0];
 
   for (int round = 0; round < kMaxRounds; ++round) {
-    const double norm = DotProduct(x, x, d);
+    const double norm = DotProduct<D>(x, x);
     if (norm < kInside * kInside) break;
     const auto [candidate, least] =
-        find_least([&](const Point& vertex) { return DotProduct(x, vertex, d); });
+        find_least([&](const Point<D>& vertex) { return DotProduct<D>(x, vertex); });
     if (least > norm - 1e-12 * std::max(1.0, norm)) break;  // No vertex is closer to the origin.
-    if (corral.size == d + 1) {  // The corral is full: remove the vertex with the smallest weight.
+    if (corral.size == D + 1) {  // The corral is full: remove the vertex with the smallest weight.
       const auto smallest = std::min_element(
           corral.lambda.begin(), corral.lambda.begin() + static_cast<long>(corral.size));
       corral.Remove(static_cast<std::size_t>(smallest - corral.lambda.begin()));
@@ -150,10 +153,10 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
     corral.lambda[corral.size] = 0.0;
     ++corral.size;
 
-    std::array<double, kMaxCorral> weights{};
+    std::array<double, D + 1> weights{};
     bool solved = false;
     while (corral.size > 0) {
-      if (!AffineMinimum(corral, d, weights)) {
+      if (!AffineMinimum<D>(corral, weights)) {
         corral.Remove(corral.size - 1);  // The new vertex is affinely dependent on the others.
         break;
       }
@@ -180,19 +183,36 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
     }
     if (!solved) break;
     for (std::size_t i = 0; i < corral.size; ++i) corral.lambda[i] = weights[i];
-    Point next{};
+    Point<D> next{};
     for (std::size_t i = 0; i < corral.size; ++i) {
-      for (std::size_t l = 0; l < d; ++l) next[l] += corral.lambda[i] * corral.points[i][l];
+      for (std::size_t l = 0; l < D; ++l) next[l] += corral.lambda[i] * corral.points[i][l];
     }
-    if (DotProduct(next, next, d) >= norm) break;  // Rounding errors prevent further progress.
+    if (DotProduct<D>(next, next) >= norm) break;  // Rounding errors prevent further progress.
     x = next;
   }
 
-  const double distance = std::sqrt(DotProduct(x, x, d));
-  for (std::size_t l = 0; l < d; ++l) {
+  const double distance = std::sqrt(DotProduct<D>(x, x));
+  for (std::size_t l = 0; l < D; ++l) {
     nearest[l] = distance < kInside ? target[l] : target[l] + x[l] / metric[l];
   }
   return distance < kInside ? 0.0 : distance;
+}
+
+}  // namespace
+
+double ProjectOntoHull(std::span<const double> points, std::span<const double> metric,
+                       double growth, std::span<const double> target, std::span<double> nearest) {
+  static_assert(kMaxParameters == 7);
+  STRIDEWIRE_CHECK(!metric.empty() && metric.size() <= kMaxParameters);
+  switch (metric.size()) {
+    case 1: return Project<1>(points, metric, growth, target, nearest);
+    case 2: return Project<2>(points, metric, growth, target, nearest);
+    case 3: return Project<3>(points, metric, growth, target, nearest);
+    case 4: return Project<4>(points, metric, growth, target, nearest);
+    case 5: return Project<5>(points, metric, growth, target, nearest);
+    case 6: return Project<6>(points, metric, growth, target, nearest);
+    default: return Project<7>(points, metric, growth, target, nearest);
+  }
 }
 
 }  // namespace stridewire
