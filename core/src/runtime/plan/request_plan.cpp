@@ -187,8 +187,9 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   const std::span<const double> metric = std::span(metric_room).first(d);
   // Projecting onto a hull is slow. A lower bound of the cost excludes most groups without
   // projection.
-  const double cost_bound_m = DistanceOutsideRange(group, metric, target, kHullGrowth) +
-                              kOutsideWeight * DistanceOutsideRange(group, metric, target, 0.0);
+  const double distance_bound_m = DistanceOutsideRange(group, metric, target, kHullGrowth);
+  const double cost_bound_m =
+      distance_bound_m + kOutsideWeight * DistanceOutsideRange(group, metric, target, 0.0);
   if (cost_bound_m + missed_m + start_error_m + group_cost_m >= best_cost_m) return std::nullopt;
 
   const std::span<const double> examples =
@@ -200,6 +201,11 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   if (outside_m == 0.0) {
     std::ranges::copy(target, plan.applied.values.begin());
   } else {
+    // The order of additions is that of plan.cost_m below, so that rounding cannot make the bound
+    // larger than the cost.
+    const double better_bound_m =
+        distance_bound_m + missed_m + kOutsideWeight * outside_m + start_error_m;
+    if (better_bound_m + group_cost_m >= best_cost_m) return std::nullopt;
     plan.distance_m = ProjectOntoHull(examples, metric, kHullGrowth, target,
                                       std::span(plan.applied.values).first(d));
   }
