@@ -206,7 +206,7 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
       // case.
       message.items.push_back({.avatar = l.avatar,
                                .layer = {l.name, strnlen(l.name, protocol::kMaxNameBytes + 1)},
-                               .fade_out = l.fade_out != 0,
+                               .enabled = l.fade_out == 0,
                                .weight = l.weight,
                                .blend_s = l.blend_s,
                                .speed = l.speed});

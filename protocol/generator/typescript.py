@@ -28,6 +28,22 @@ class TypeScript:
         cpp = f.get("cpp", "")
         return f.get("web") or lower_camel(cpp if cpp.isidentifier() else f.name)
 
+    def interface_name(self, table):
+        """Messages have the names of the C++ structs, because Error exists in JavaScript."""
+        return table.get("cpp", table.name) if "message" in table else table.name
+
+    def vector_of(self, f):
+        """The property that contains the field, for members such as `min_m.x`, or None."""
+        name, _, member = f.get("cpp", "").partition(".")
+        return lower_camel(name) if member in ("x", "y", "z") else None
+
+    def properties(self, table):
+        """The fields of each property. The members of a vector are one property."""
+        properties = {}
+        for f in table.fields:
+            properties.setdefault(self.vector_of(f) or self.name_of(f), []).append(f)
+        return properties
+
     def is_tuple(self, table):
         """True for vectors and quaternions, which are arrays in TypeScript."""
         return table.is_struct and all(f.name in "xyzw" for f in table.fields)
@@ -44,7 +60,7 @@ class TypeScript:
             name = f"readonly [{', '.join(['number'] * len(table.fields))}]"
         elif table is not None:
             member = self.only_member(table)
-            name = self.type_of(member) if member else table.get("cpp", table.name)
+            name = self.type_of(member) if member else self.interface_name(table)
         elif f.get("enumerators") or f.type in self.schema.enums:
             name = f.get("enumerators") or f.type
         elif f.is_list:
@@ -81,11 +97,14 @@ class TypeScript:
         return limit and limit.default + (" bytes" if name.endswith("Bytes") else "")
 
     def interface(self, table):
-        tag = f"  type: '{table.name}';\n" if "message" in table else ""
-        members = "".join(
-            f"{self.comment(self.schema.documentation(f), '  ')}"
-            f"  {self.name_of(f)}: {self.type_of(f)};\n" for f in table.fields)
-        return (f"{self.comment(table.doc)}export interface {table.get('cpp', table.name)} "
+        tag = f"  readonly type: '{table.name}';\n" if "message" in table else ""
+        members = ""
+        for name, fields in self.properties(table).items():
+            types = [self.type_of(f) for f in fields]
+            type_name = types[0] if len(types) == 1 else f"readonly [{', '.join(types)}]"
+            members += (f"{self.comment(self.schema.documentation(fields[0]), '  ')}"
+                        f"  readonly {name}: {type_name};\n")
+        return (f"{self.comment(table.doc)}export interface {self.interface_name(table)} "
                 f"{{\n{tag}{members}}}\n")
 
     def enum_type(self, enum):
@@ -107,7 +126,7 @@ class TypeScript:
         interfaces = "\n".join(
             self.interface(t) for t in self.schema.tables.values()
             if not self.is_tuple(t) and "web" not in t and not self.only_member(t))
-        sent = {side: " |\n    ".join(m.get("cpp", m.name) for m in self.schema.messages
+        sent = {side: " |\n    ".join(self.interface_name(m) for m in self.schema.messages
                                       if m.get("sender") in (side, "both"))
                 for side in ("client", "server")}
         types_of_messages = "".join(f"  {m.name}: {m.get('message')},\n"

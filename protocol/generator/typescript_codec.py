@@ -10,9 +10,6 @@ ADDERS = {"bool": "Int8", "ubyte": "Int8", "short": "Int16", "ushort": "Int16", 
 
 
 class TypeScriptCodec(TypeScript):
-    def interface_name(self, table):
-        return table.get("cpp", table.name)
-
     def enum_of(self, f):
         """The name of the enum whose values the field or the entries of its list have, or None."""
         return f.get("enumerators") or (f.type if f.type in self.schema.enums else None)
@@ -86,7 +83,9 @@ class TypeScriptCodec(TypeScript):
             return f"'{lower_camel(self.first_value(f))}'"
         if "optional" in f or f.default == "null":
             return "null"
-        return {"bool": "false"}.get(f.type, f.default or "0")
+        if f.type == "bool":
+            return f.get("initial", "true" if "inverted" in f else "false")
+        return f.default or "0"
 
     def first_value(self, f):
         return f.default or next(iter(self.schema.enums[self.enum_of(f)].values))
@@ -112,10 +111,12 @@ class TypeScriptCodec(TypeScript):
                     value = f"{condition} ? {value} : {self.unused(f)}"
                 if f.name in deciding:
                     lines.append(f"const {name} = {value};")
-            for f in table.fields:
-                name, value = self.name_of(f), self.read(f)
+            for name, (f, *others) in self.properties(table).items():
+                value = self.read(f)
                 if condition := self.used_if(f, table):
                     value = f"{condition} ? {value} : {self.unused(f)}"
+                if others:
+                    value = f"[{', '.join(self.read(each) for each in [f, *others])}]"
                 properties.append(f"  {name}," if f.name in deciding else f"  {name}: {value},")
             lines += ["return {", *properties, "};"]
         if table.is_struct:
@@ -185,8 +186,8 @@ class TypeScriptCodec(TypeScript):
     def absent(self, f):
         """The default value of a property that may be absent, or None. generator/README.md lists
         the cases."""
-        if not (f.default or "only" in f or "optional" in f or (f.is_list and "min" not in f) or
-                (f.type == "bool" and "inverted" not in f)):
+        if not (f.default or "only" in f or "optional" in f or f.type == "bool" or
+                (f.is_list and "min" not in f)):
             return None
         return self.unused(f)
 
@@ -240,11 +241,18 @@ class TypeScriptCodec(TypeScript):
             lines.append(f"const members = check.tuple(value, at, {count});")
             values = [self.check(f, f"members[{i}]", "at") for i, f in enumerate(table.fields)]
         else:
-            names = ", ".join(self.name_of(f) for f in table.fields)
-            lines.append(f"const {{{names}}} = check.object(value, at);")
-            values = [("..." if self.table_of(f) else "") +
-                      self.check(f, self.name_of(f), f"at.of('{self.name_of(f)}')")
-                      for f in table.fields]
+            properties = self.properties(table)
+            lines.append(f"const {{{', '.join(properties)}}} = check.object(value, at);")
+            values = []
+            for name, fields in properties.items():
+                at = f"at.of('{name}')"
+                if len(fields) > 1:
+                    lines.append(f"const {name}Values = check.tuple({name}, {at}, {len(fields)});")
+                    values += [self.check(f, f"{name}Values[{i}]", at)
+                               for i, f in enumerate(fields)]
+                else:
+                    values.append(("..." if self.table_of(fields[0]) else "") +
+                                  self.check(fields[0], name, at))
         lines.append(f"return [{', '.join(values)}];")
         numbers = ", ".join(["number"] * self.number_count(table))
         return self.function(f"function arguments{table.name}(value: unknown, at: check.Place): "
@@ -301,8 +309,10 @@ class TypeScriptCodec(TypeScript):
         return f"String({value})" if f.type == "ulong" else value
 
     def json_lines(self, table):
+        properties = self.properties(table)
         for f in table.fields:
-            m = f"m.{self.name_of(f)}"
+            vector = self.vector_of(f)
+            m = f"m.{vector}[{properties[vector].index(f)}]" if vector else f"m.{self.name_of(f)}"
             value = self.json_value(f, m)
             if "bytes" in f:
                 value = f"Buffer.from({m}).toString('hex')"

@@ -13,7 +13,7 @@ import {
 } from '../generated/messages';
 import {NativeEvent} from '../generated/native';
 import * as commands from './wire/commands';
-import {avatarStateOf, eventOf, terrainOf} from './wire/convert';
+import {avatarStateOf, eventOf} from './wire/convert';
 import {Malformed} from './wire/check';
 import {
   frameHeaderBytes, readMessage, typeOfFrame, writeMessage, type Draft
@@ -592,7 +592,7 @@ export class Session {
         case NativeEvent.terrain: {
           if (world === undefined) break;
           const sent = type === MessageType.WorldTerrain ? read() : null;
-          const terrain = sent?.type === 'WorldTerrain' ? terrainOf(sent.terrain) : null;
+          const terrain = sent?.type === 'WorldTerrain' ? sent.terrain : null;
           world.terrain = terrain;
           this.later(() => world.listeners.emit('terrain', terrain));
           break;

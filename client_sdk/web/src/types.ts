@@ -7,10 +7,13 @@
  * length and are stored as x, y, z, w.
  */
 import type * as messages from '../generated/messages';
-import type {Foot, MovementType, RequestItem, Role} from '../generated/messages';
+import type {
+  EndSite, Foot, Leg, MovementType, RequestItem, Role, Terrain
+} from '../generated/messages';
 
 export type {
-  Foot, Interrupt, MovementKind, MovementType, RequestOutcome, Role
+  EndSite, EventType as WorldEventType, Foot, HeightField, Interrupt, Landing, Leg, MovementKind,
+  MovementType, PlayingLayer, RequestOutcome, Role, Terrain, TerrainBox
 } from '../generated/messages';
 /**
  * Precision of received poses.
@@ -33,10 +36,6 @@ export type PoseMode = 'full' | 'quantised' | 'movement';
  * joint.
  */
 export type PoseDetail = 'all' | 'reduced' | 'root';
-/** `entered` and `left` occur only if a region is observed. They report that an avatar entered the
- * region, or left the region or the world. */
-export type WorldEventType = 'accepted' | 'started' | 'footStrike' | 'finished' | 'idle' |
-    'rejected' | 'spawned' | 'removed' | 'entered' | 'left';
 export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | 'endZ' | 'turn' |
     'length' | 'height';
 /**
@@ -83,32 +82,9 @@ export interface Reply {
 }
 
 /** Result of one item of a command. */
-export interface ReplyItem extends Readonly<messages.ReplyItem> {
+export interface ReplyItem extends messages.ReplyItem {
   /** Name of the code. */
   readonly status: string;
-}
-
-/** Grid of ground heights, interpolated bilinearly. */
-export type HeightField = Readonly<messages.HeightFieldInfo>;
-
-/** Axis-aligned block with vertical sides and a flat top. */
-export interface TerrainBox {
-  /** Smallest x and z. */
-  readonly minM: readonly [number, number];
-  /** Largest x and z; each must be greater than in `minM`. */
-  readonly maxM: readonly [number, number];
-  /** Height of the top, in [-10000, 10000]. */
-  readonly heightM: number;
-}
-
-/**
- * The ground of a world. Its height at a point is the maximum of the height field and the boxes
- * there. Outside the grid of the height field, and if there is no height field, that height is 0.
- */
-export interface Terrain {
-  readonly heightField: HeightField | null;
-  /** Boxes on the ground, at most 65536. */
-  readonly boxes: readonly TerrainBox[];
 }
 
 /** An avatar to spawn. `teleport` requires `avatar`. */
@@ -118,14 +94,8 @@ export type SpawnItem = Optional<messages.SpawnItem, 'avatar' | 'teleport'>;
  * Starts, changes or ends a layer: a clip of the motion library that is blended over an avatar's
  * movements, for example waving. Layers do not change the legs and the root.
  */
-export interface LayerRequest
-    extends Optional<Omit<messages.LayerItem, 'fadeOut'>, 'weight' | 'blendS' | 'speed'> {
-  /**
-   * True starts or changes the layer. False fades it out and ends it; `weight` and `speed` are then
-   * ignored. Default true.
-   */
-  readonly enabled?: boolean;
-}
+export type LayerRequest =
+    Optional<messages.LayerItem, 'enabled' | 'weight' | 'blendS' | 'speed'>;
 
 /**
  * A movement to add to an avatar's queue. The comments state which types use a field; other types
@@ -145,19 +115,18 @@ export interface MovementRequest
 
 /** A request that waits in an avatar's queue. Fields that its type does not use are 0, empty or
  * null. */
-export type QueuedRequest = Readonly<RequestItem>;
+export type QueuedRequest = RequestItem;
 
 /** State of an avatar at a tick: the result of `World.inspect`. */
 export interface AvatarState
-    extends Readonly<Omit<messages.AvatarState,
-                          'type' | 'nonce' | 'world' | 'code' | 'text' | 'movement'>> {
+    extends Omit<messages.AvatarState,
+                 'type' | 'nonce' | 'world' | 'code' | 'text' | 'movement'> {
   /** The current movement; null if the avatar is idle. */
   readonly movement: CurrentMovement | null;
 }
 
 /** The movement that an avatar carries out. A stand has no group, keytimes or weights. */
-export interface CurrentMovement
-    extends Readonly<Omit<messages.CurrentMovement, 'parameterNames'>> {
+export interface CurrentMovement extends Omit<messages.CurrentMovement, 'parameterNames'> {
   /** Server time of the last keytime. */
   readonly endTimeS: number;
   /** Names of the columns of `exampleParameters`. */
@@ -228,22 +197,10 @@ export interface Subscription {
 }
 
 /** Something that happened to an avatar. Fields that the type does not use are 0, empty or null. */
-export interface WorldEvent extends Readonly<Omit<messages.Event, 'foot'>> {
+export interface WorldEvent extends Omit<messages.Event, 'foot'> {
   /** Foot strike: the foot that landed. Rejected step: the foot that should have moved. */
   readonly foot: Foot | null;
 }
-
-/** Tip of a chain of joints, for example of the head or a toe. */
-export type EndSite = Readonly<messages.EndSiteInfo>;
-
-/** A layer that is active on an avatar. */
-export type PlayingLayer = Readonly<messages.PlayingLayer>;
-
-/** The planned landing of a foot in the current movement. */
-export type Landing = Readonly<messages.Landing>;
-
-/** Joints of a leg, as indices into the skeleton; -1: unknown. */
-export type Leg = Readonly<messages.LegInfo>;
 
 /** The skeleton shared by all avatars of a world. */
 export interface Skeleton {

@@ -88,11 +88,11 @@ export class WorldHandle implements World {
   }
 
   setTerrain(terrain: Terrain | null): Promise<Reply> {
-    return this.session.command(this, () => commands.setTerrain(terrain));
+    return this.session.command(this, () => ({type: 'SetTerrain', terrain}));
   }
 
   setLayers(items: readonly LayerRequest[]): Promise<Reply> {
-    return this.session.command(this, () => commands.setLayers(items));
+    return this.session.command(this, () => ({type: 'SetLayers', items}));
   }
 
   setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply> {

@@ -3,7 +3,6 @@ import {test} from 'node:test';
 import {Session} from '../src/session';
 import {defaultOptions} from '../src/session_options';
 import type {PoseDetail, Region, Reply, Terrain} from '../src/types';
-import {terrainOf} from '../src/wire/convert';
 import * as server from './support/server_frames';
 import {Harness, statusOf, summary} from './support/session_harness';
 
@@ -106,7 +105,7 @@ test('sends terrain and footprints unchanged', async () => {
   ]);
   const [first, second, third] = h.sent();
   assert.ok(first?.type === 'SetTerrain' && second?.type === 'SetTerrain');
-  assert.deepEqual(terrainOf(first.terrain), {
+  assert.deepEqual(first.terrain, {
     heightField: {...heightField, heightsM: Float32Array.of(0, 0.5, 1, 1.5)}, boxes
   });
   assert.equal(second.terrain, null);
@@ -210,8 +209,8 @@ test('sends layers', async () => {
   const [sent] = h.sent();
   assert.ok(sent?.type === 'SetLayers');
   assert.deepEqual(sent.items, [
-    {avatar: 1, layer: 'wave', fadeOut: false, weight: 1, blendS: 0.3, speed: 1},
-    {avatar: 2, layer: 'carry', fadeOut: true, weight: 1, blendS: 0, speed: 1},
+    {avatar: 1, layer: 'wave', enabled: true, weight: 1, blendS: 0.3, speed: 1},
+    {avatar: 2, layer: 'carry', enabled: false, weight: 1, blendS: 0, speed: 1},
   ]);
   for (const wrong of [{avatar: 0, layer: 'wave'}, {avatar: 1, layer: ''}, {avatar: 1},
                        {avatar: 1, layer: 'wave', weight: NaN},

@@ -243,7 +243,7 @@ void WorldShard::SetLayers(const LayerPart& part, CommandResult& result) {
     }
     const Status status =
         it->second.avatar.SetLayer({.layer = world_->library->FindLayer(asked.layer),
-                                    .enabled = !asked.fade_out,
+                                    .enabled = asked.enabled,
                                     .weight = asked.weight,
                                     .blend_s = asked.blend_s,
                                     .speed = asked.speed});

@@ -927,11 +927,11 @@ TEST(ServerSession, AcceptsLayersOnlyWithTheirFeature) {
                          {{1, "wave"},
                           {9, "wave"},
                           {2, "dance"},
-                          {3, "carry", false, 2.0},
-                          {3, "carry", false, 1.0, 11.0},
-                          {2, "wave", false, 1.0, 0.3, 0.0},
+                          {3, "carry", true, 2.0},
+                          {3, "carry", true, 1.0, 11.0},
+                          {2, "wave", true, 1.0, 0.3, 0.0},
                           {3, "carry"},
-                          {2, "carry", true}});
+                          {2, "carry", false}});
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->code, StatusCode::kOk);
   EXPECT_EQ(reply->accepted, 3u);

@@ -277,7 +277,7 @@ class TypeScriptTest(unittest.TestCase):
         messages = self.web.messages()
         for line in ("Color: ['red', 'green'],", "speedMS: number | null;", "visible: boolean;",
                      "color: Color;", "place: readonly [number, number];", "Paint: 7,",
-                     "  /** 1 to 65536 entries. */\n  items: readonly Item[];\n",
+                     "  /** 1 to 65536 entries. */\n  readonly items: readonly Item[];\n",
                      "/**\n * Color of paint.\n * - `green`: Not blue.\n */\nexport type Color"):
             self.assertIn(line, messages)
         self.assertNotIn("old", messages)
@@ -287,7 +287,7 @@ class TypeScriptTest(unittest.TestCase):
         for line in ("  color: enums.Color[w.color()]!,", "  visible: !w.hidden(),",
                      "  items: list(w.itemsLength(), (i) => readItem(w.items(i))),",
                      "  speedMS: w.speedMS(),", "  place: readPoint(w.place()),",
-                     "  const {seq, color, text, items, visible, place} = "
+                     "  const {seq, color, text, items, visible = true, place} = "
                      "check.object(fields, at);",
                      "  b.addFieldInt8(5, Number(!visibleValue), 0);",
                      "  if (speedMSValue !== null) b.addFieldFloat64(1, speedMSValue, NaN);",
@@ -295,6 +295,22 @@ class TypeScriptTest(unittest.TestCase):
                      " = check.integer(avatar, at.of('avatar'), 0, 4294967295);"):
             self.assertIn(line, codec)
         self.assertNotIn("old", codec)
+
+    def test_members_of_a_vector_are_an_array(self):
+        web = TypeScriptCodec(read("""struct Box {
+          /// Smallest x and z.
+          min_x: double (cpp: "min_m.x", group: "GroundPoint");
+          min_z: double (cpp: "min_m.z");
+          height_m: double;
+        }"""))
+        self.assertIn("  /** Smallest x and z. */\n  readonly minM: readonly [number, number];\n",
+                      web.messages())
+        for line in ("  minM: [w.minX(), w.minZ()],",
+                     "  const {minM, heightM} = check.object(value, at);",
+                     "  const minMValues = check.tuple(minM, at.of('minM'), 2);",
+                     "check.real(minMValues[1], at.of('minM')), check.real(heightM, "):
+            self.assertIn(line, web.codec())
+        self.assertIn("  json.min_z = m.minM[1];", web.json())
 
 
 class StandardTest(unittest.TestCase):

@@ -1,17 +1,8 @@
-import type {AvatarState, Terrain, WorldEvent} from '../types';
-import type {AvatarState as AvatarStateMessage, Event, TerrainInfo} from '../../generated/messages';
+import type {AvatarState, WorldEvent} from '../types';
+import type {AvatarState as AvatarStateMessage, Event} from '../../generated/messages';
 import {parameterNames} from './parameters';
 
 /** Functions that convert messages to those public types that differ from the schema. */
-
-export function terrainOf(from: TerrainInfo | null): Terrain | null {
-  return from && {
-    heightField: from.heightField,
-    boxes: from.boxes.map(({minX, minZ, maxX, maxZ, heightM}) => ({
-      minM: [minX, minZ], maxM: [maxX, maxZ], heightM
-    })),
-  };
-}
 
 export function eventOf(event: Event): WorldEvent {
   const isRejectedStep =

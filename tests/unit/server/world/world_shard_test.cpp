@@ -194,13 +194,13 @@ TEST(WorldShard, PlaysLayersLikeASingleAvatar) {
     }
     for (std::uint64_t tick = 1; tick <= 120; ++tick) {
       if (tick == 20 || tick == 70) {
-        const bool is_off = tick == 70;
-        ASSERT_EQ(execute(1, tick, LayerPart{{{0, {1, "wave", is_off, 0.75, 0.5, 1.5}}}}), 1u);
-        ASSERT_EQ(execute(2, tick, LayerPart{{{0, {2, "carry", is_off}}}}), 1u);
+        const bool enabled = tick == 20;
+        ASSERT_EQ(execute(1, tick, LayerPart{{{0, {1, "wave", enabled, 0.75, 0.5, 1.5}}}}), 1u);
+        ASSERT_EQ(execute(2, tick, LayerPart{{{0, {2, "carry", enabled}}}}), 1u);
         const int wave = library->FindLayer("wave");
         const int carry = library->FindLayer("carry");
-        ASSERT_TRUE(alone[0].SetLayer({wave, !is_off, 0.75, 0.5, 1.5}).has_value());
-        ASSERT_TRUE(alone[1].SetLayer({carry, !is_off, 1.0, 0.3, 1.0}).has_value());
+        ASSERT_TRUE(alone[0].SetLayer({wave, enabled, 0.75, 0.5, 1.5}).has_value());
+        ASSERT_TRUE(alone[1].SetLayer({carry, enabled, 1.0, 0.3, 1.0}).has_value());
       }
       for (const auto& shard : shards) shard->Advance(tick, 1);
       for (AvatarSimulation& avatar : alone) avatar.Advance(kClock.tick_s());
