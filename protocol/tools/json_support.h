@@ -1,12 +1,8 @@
 #pragma once
 
-#include <cstdint>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
-#include <vector>
 
-#include "stridewire/protocol/messages.h"
+#include "test_vectors.h"
 
 /// Functions that the generated code (fields_json.cpp) calls.
 namespace stridewire::protocol {

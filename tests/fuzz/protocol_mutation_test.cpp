@@ -14,12 +14,12 @@
 #include <string>
 
 #include "counted_memory.h"
-#include "sample_messages.h"
 #include "stridewire/protocol/check.h"
 #include "stridewire/protocol/decode.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/frame_reader.h"
 #include "stridewire/protocol/pose_batch_reader.h"
+#include "test_vectors.h"
 
 namespace stridewire::protocol {
 namespace {

@@ -4,8 +4,8 @@
 #include <map>
 
 #include "protocol_testing.h"
-#include "sample_messages.h"
 #include "stridewire_generated.h"
+#include "test_vectors.h"
 
 // Builds payloads that the encoder never writes.
 namespace stridewire::protocol {

@@ -3,7 +3,7 @@
 #include <random>
 
 #include "protocol_testing.h"
-#include "sample_messages.h"
+#include "test_vectors.h"
 
 namespace stridewire::protocol {
 namespace {

@@ -1,8 +1,7 @@
 #include <set>
 
-#include "message_json.h"
 #include "protocol_testing.h"
-#include "sample_messages.h"
+#include "test_vectors.h"
 
 namespace stridewire::protocol {
 namespace {

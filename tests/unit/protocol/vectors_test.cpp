@@ -3,10 +3,9 @@
 #include <iterator>
 #include <set>
 
-#include "message_json.h"
 #include "protocol_testing.h"
-#include "sample_messages.h"
 #include "test_paths.h"
+#include "test_vectors.h"
 
 namespace stridewire::protocol {
 namespace {

@@ -1,9 +1,13 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
+#include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
 
+/// The messages of the test vectors, and the JSON in which protocol/vectors contains them.
 namespace stridewire::protocol {
 
 /// Converts a message to the JSON of the test vectors, with the field names of the schema. 64-bit
@@ -15,5 +19,18 @@ namespace stridewire::protocol {
 /// Throws std::invalid_argument for an unknown type, and the exceptions of nlohmann::json if
 /// members have other types.
 [[nodiscard]] Message FromJson(const nlohmann::ordered_json& json);
+
+/// A message for a test vector. Most fields differ from their defaults.
+struct SampleMessage {
+  std::string name;  ///< File name of the vector, for example "request_crowd".
+  Message message;
+};
+
+/// Returns the messages of all test vectors, in alphabetical order.
+[[nodiscard]] std::vector<SampleMessage> SampleMessages();
+
+/// Returns the codecs for the compact poses of the vectors. Their parameters are those in the
+/// vector `world_info_detail`.
+[[nodiscard]] const CompactCodecs& SampleCodecs();
 
 }  // namespace stridewire::protocol
