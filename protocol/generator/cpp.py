@@ -81,10 +81,9 @@ class Cpp:
 
     def that(self, condition, at, text, code="OutOfRange", value=None):
         """A check of one value. The error contains `value`, an integer, unless it is None."""
-        if value is None:
-            return f'found.That({condition}, ErrorCode::k{code}, "{text}", {at});'
-        code = "" if code == "OutOfRange" else f", ErrorCode::k{code}"
-        return f'found.That({condition}, {at}, {value}, "{text}"{code});'
+        more = f", ErrorCode::k{code}" if value is not None or code != "OutOfRange" else ""
+        more += f", {value}" if value is not None else ""
+        return f'found.That({condition}, {at}, "{text}"{more});'
 
     def known(self, value, last, at):
         """A check that a number belongs to an enum."""
@@ -158,23 +157,24 @@ class Cpp:
         m, at, lines = self.member(f), self.at(f), []
         for bound, sign, words in (("max", "<=", "at most"), ("below", "<", "a number below")):
             if other := fields.get(f.get(bound)):
-                lines.append(f'found.That({m} {sign} {self.member(other)}, {at}, {m}, '
-                             f'"expected {words} {other.name}");')
+                lines.append(self.that(f"{m} {sign} {self.member(other)}", at,
+                                       f"expected {words} {other.name}", value=m))
         if low := f.get("min_or_none"):
             expected = (f"expected {self.text_of(low)} to {self.text_of(f.get('max'))} bytes, "
                         "or none")
-            lines.append(f"found.That({m}.empty() || {m}.size() >= {self.bound(low)}, {at}, "
-                         f'{m}.size(), "{expected}", ErrorCode::kLimitExceeded);')
+            lines.append(self.that(f"{m}.empty() || {m}.size() >= {self.bound(low)}", at, expected,
+                                   "LimitExceeded", f"{m}.size()"))
         if other := fields.get(f.get("per")):
-            lines.append(f"found.That({m}.size() == {self.member(other)}.size(), {at}, {m}.size(), "
-                         f'"expected one entry per {other.name[:-1]}", ErrorCode::kShapeMismatch);')
+            lines.append(self.that(f"{m}.size() == {self.member(other)}.size()", at,
+                                   f"expected one entry per {other.name[:-1]}", "ShapeMismatch",
+                                   f"{m}.size()"))
         if other := fields.get(f.get("requires")):
-            lines.append(f"found.That(!{m} || {self.member(other)}, ErrorCode::kMalformed, "
-                         f'"{f.name} requires a {other.name}", {at});')
+            lines.append(self.that(f"!{m} || {self.member(other)}", at,
+                                   f"{f.name} requires a {other.name}", "Malformed"))
         other = fields.get(f.get("without"))
         if other is not None and f.type == other.type == "bool":
-            lines.append(f"found.That(!{m} || !{self.member(other)}, ErrorCode::kMalformed, "
-                         f'"{other.name} excludes {f.get("cpp", f.name)}", {self.at(other)});')
+            lines.append(self.that(f"!{m} || !{self.member(other)}", self.at(other),
+                                   f"{other.name} excludes {f.get('cpp', f.name)}", "Malformed"))
         return lines
 
     def check_function(self, table):
@@ -197,17 +197,15 @@ class Cpp:
     def unpack(self, f, in_struct):
         m, at, w = self.member(f), self.at(f), f"w.{f.name}()"
         if f.is_list:
-            entries = "u.Borrow" if "borrowed" in f else "u.Entries"
-            name = "UnpackList" if f.type in self.schema.tables else entries
-            first = "u, " if f.type in self.schema.tables else ""
-            return f"{name}({first}{w}, {self.bounds(f)}, {at}, {m});"
+            unpack = "UnpackList(found, " if f.type in self.schema.tables else "found.Copy("
+            return f"{unpack}{w}, {self.bounds(f)}, {at}, {m});"
         if f.type == "string":
-            return f"u.CopyText({w}, {self.bounds(f)}, {at}, {m});"
+            return f"found.Copy({w}, {self.bounds(f)}, {at}, {m});"
         if f.type in self.schema.tables:
             if in_struct:
-                return f"Unpack(u, {at}, {w}, {m});"
+                return f"Unpack(found, {at}, {w}, {m});"
             target = f"{m}.emplace()" if "optional" in f else m
-            return f"if (const auto* from = {w}) Unpack(u, {at}, *from, {target});"
+            return f"if (const auto* from = {w}) Unpack(found, {at}, *from, {target});"
         if "inverted" in f:
             return f"{m} = !{w};"
         if f.type in self.schema.enums:
@@ -221,7 +219,7 @@ class Cpp:
         return [self.used_if(f, "w.{}()") + self.unpack(f, table.is_struct) for f in fields]
 
     def unpack_function(self, table, lines, struct=None):
-        return self.function(f"void Unpack([[maybe_unused]] Unpacker& u, "
+        return self.function(f"void Unpack([[maybe_unused]] Findings& found, "
                              f"[[maybe_unused]] const FieldPath& at, const wire::{table.name}& w, "
                              f"{self.type_name(struct or table.name)}& m)", lines)
 
@@ -237,14 +235,14 @@ class Cpp:
                 absent = " || ".join(f"!w.{f.name}()" for f in needed)
                 names = " and ".join(f.name for f in needed)
                 lines = [f"if ({absent}) {{",
-                         f'  return u.Wrong(ErrorCode::kMalformed, "a {value.lower()} requires '
+                         f'  return found.Wrong(ErrorCode::kMalformed, "a {value.lower()} requires '
                          f'{names}", At(at, "type"));', "}"] + lines
             functions.append(self.unpack_function(table, lines, alternative.name))
-            cases.append(f"  case wire::{enum.name}::{value}: return Unpack(u, at, w, "
+            cases.append(f"  case wire::{enum.name}::{value}: return Unpack(found, at, w, "
                          f"{self.variant(table)}.emplace<{alternative.name}>());")
         last = len(cases) - 1
         lines = self.unpack_lines(table) + ["switch (w.type()) {", *cases, "}"]
-        lines.append(self.known("w.type()", last, 'At(at, "type")').replace("found.", "u."))
+        lines.append(self.known("w.type()", last, 'At(at, "type")'))
         return functions + [self.unpack_function(table, lines)]
 
     # ---- encoding
@@ -263,18 +261,31 @@ class Cpp:
             return f"const auto {f.name}_entries = Entries(b, {m});"
         return f"const auto {f.name} = Build(b, {m});"
 
+    def list_offset(self, f):
+        """The type of the offset of a list."""
+        entry = CPP_TYPES.get(f.type) or f"Offset<wire::{f.type}>"
+        entry = f"const wire::{f.type}*" if self.schema.is_struct(f.type) else entry
+        return f"Offset<flatbuffers::Vector<{entry}>>"
+
+    def build_list(self, f):
+        m = self.member(f)
+        if self.schema.is_struct(f.type):
+            return f"b.CreateVectorOfNativeStructs<wire::{f.type}>({m}, ToWire)"
+        if f.type in self.schema.tables:
+            return f"b.CreateVector({f.name}_entries)" if "early" in f else \
+                f"b.CreateVector(Entries(b, {m}))"
+        numbers = f"reinterpret_cast<const {CPP_TYPES[f.type]}*>({m}.data())"
+        return f"b.CreateVector({numbers}, {m}.size())"
+
     def build(self, f):
         """A statement that builds a struct, or a field that is stored by offset. Else None."""
         m = self.member(f)
-        keep = "true" if "keep_empty" in f else "false"
-        if other := f.get("keep_empty"):
-            keep = f"!m.{other}.empty()"
         if f.is_list:
-            if f.type in self.schema.tables and not self.schema.is_struct(f.type):
-                entries = f"{f.name}_entries" if "early" in f else f"Entries(b, {m})"
-                return f"const auto {f.name} = TableList(b, {entries}, {keep});"
-            kind = "StructList" if f.type in self.schema.tables else "ScalarList"
-            return f"const auto {f.name} = {kind}(b, {m}, {keep});"
+            value = self.build_list(f)
+            if "keep_empty" not in f or f.get("keep_empty"):
+                empty = f"m.{f.get('keep_empty')}" if f.get("keep_empty") else m
+                value = f"{empty}.empty() ? {self.list_offset(f)}() : {value}"
+            return f"const auto {f.name} = {value};"
         if f.type == "string":
             create = "CreateSharedString" if "shared" in f else "CreateString"
             return (f"const auto {f.name} = {m}.empty() ? Offset<flatbuffers::String>() "
@@ -308,8 +319,7 @@ class Cpp:
             elif "only" not in f:
                 arguments.append(self.argument(f))
             elif f.is_list:
-                entry = f.type if f.type not in self.schema.tables else f"const wire::{f.type}*"
-                declared[f.name] = f"Offset<flatbuffers::Vector<{entry}>> {f.name};"
+                declared[f.name] = f"{self.list_offset(f)} {f.name};"
                 arguments.append(f.name)
             elif self.schema.is_struct(f.type):
                 declared[f.name] = f"std::optional<wire::{f.type}> {f.name};"
@@ -328,7 +338,8 @@ class Cpp:
                 value = self.wire_scalar(f)
                 condition = self.used_if(f, "m.{}")
                 if f.is_list:
-                    value = f"StructList(b, {self.member(f)}, false)"
+                    value = self.build_list(f)
+                    condition = f"if (!{self.member(f)}.empty()) "
                 elif self.schema.is_struct(f.type):
                     value = f"ToWire({'*' if 'optional' in f else ''}{self.member(f)})"
                     condition = f"if ({self.member(f)}) " if "optional" in f else condition
@@ -551,9 +562,12 @@ class Cpp:
             checks = ["CheckFields", "CheckMeaning"] if "meaning" in t else ["CheckFields"]
             lines += [f"void {check}(Findings& found, const FieldPath& at, const {name}& m);"
                       for check in checks]
-            lines += [f"void Unpack(Unpacker& u, const FieldPath& at, const wire::{t.name}& w, "
+            lines += [f"void Unpack(Findings& found, const FieldPath& at, const wire::{t.name}& w, "
                       f"{name}& m);", f"[[nodiscard]] {self.build_signature(t)};"]
-        return (self.head() + "#pragma once\n\nnamespace stridewire::protocol {\n\n" +
+        return (self.head() + '#pragma once\n\n#include "findings.h"\n'
+                '#include "stridewire/protocol/messages.h"\n#include "stridewire_generated.h"\n\n'
+                "namespace stridewire::protocol {\n\nusing flatbuffers::FlatBufferBuilder;\n"
+                "using flatbuffers::Offset;\n\n" +
                 "\n".join(lines) + "\n\n}  // namespace stridewire::protocol\n")
 
     def codec_source(self):

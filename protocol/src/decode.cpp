@@ -25,11 +25,11 @@ Expected<Message> Decode(std::span<const std::byte> payload) {
                 std::string(MessageTypeName(T::kType)));
   }
   T message;
-  Unpacker unpacker;
+  Findings found;
   const FieldPath path{.name = MessageTypeName(T::kType)};
-  Unpack(unpacker, path, *flatbuffers::GetRoot<Wire>(bytes), message);
-  if (unpacker.ok()) CheckFields(unpacker, path, message);
-  if (Status status = unpacker.Result(); !status) return std::unexpected(std::move(status.error()));
+  Unpack(found, path, *flatbuffers::GetRoot<Wire>(bytes), message);
+  if (found.ok()) CheckFields(found, path, message);
+  if (Status status = found.Result(); !status) return std::unexpected(std::move(status.error()));
   return Message(std::move(message));
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <flatbuffers/flatbuffers.h>
+
 #include <algorithm>
 #include <cmath>
 #include <concepts>
@@ -7,10 +9,10 @@
 #include <cstdint>
 #include <optional>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include "stridewire/base/error.h"
-#include "stridewire/base/math.h"
 #include "utf8.h"
 
 namespace stridewire::protocol {
@@ -26,6 +28,11 @@ struct FieldPath {
 [[nodiscard]] inline FieldPath At(const FieldPath& parent, std::string_view name) {
   return {&parent, name, -1};
 }
+/// Returns the path of an entry of the list `name`.
+[[nodiscard]] inline FieldPath At(const FieldPath& parent, std::string_view name,
+                                  std::size_t index) {
+  return {&parent, name, static_cast<std::int64_t>(index)};
+}
 /// Returns the path of an entry of the list at `list`.
 [[nodiscard]] inline FieldPath Entry(const FieldPath& list, std::size_t index) {
   return {list.parent, list.name, static_cast<std::int64_t>(index)};
@@ -38,9 +45,9 @@ struct Bounds {
   const char* expected = "";
 };
 
-/// Checks values and stores the first error. `Error::where` is the path without indices, for
-/// example "Spawn.items.heading_rad". `Error::index` is the index of the outermost list in the
-/// path, otherwise the offending value if it is an integer.
+/// Copies lists and checks values, and stores the first error. `Error::where` is the path without
+/// indices, for example "Spawn.items.heading_rad". `Error::index` is the index of the outermost
+/// list in the path, otherwise the offending value if it is an integer.
 class Findings {
  public:
   [[gnu::cold]] void Wrong(ErrorCode code, const char* text, const FieldPath& at,
@@ -49,19 +56,19 @@ class Findings {
   [[nodiscard]] bool ok() const { return !error_; }
 
   /// Checks a value or a rule between fields.
-  template <std::integral Value>
-  void That(bool holds, const FieldPath& at, Value value, const char* expected,
-            ErrorCode code = ErrorCode::kOutOfRange) {
-    if (!holds) Wrong(code, expected, at, static_cast<std::int64_t>(value));
+  template <std::integral Value = int>
+  void That(bool holds, const FieldPath& at, const char* text,
+            ErrorCode code = ErrorCode::kOutOfRange, Value value = -1) {
+    if (!holds) Wrong(code, text, at, static_cast<std::int64_t>(value));
   }
-  void That(bool holds, ErrorCode code, const char* text, const FieldPath& at) {
-    if (!holds) Wrong(code, text, at);
+
+  void That(const Status& holds, const FieldPath& at) {
+    if (!holds) Wrong(holds.error().code, holds.error().text, at, holds.error().index);
   }
 
   void Count(std::size_t count, const Bounds& bounds, const FieldPath& at) {
-    const auto value = static_cast<std::int64_t>(count);
-    if (count < bounds.min) Wrong(ErrorCode::kMalformed, bounds.expected, at, value);
-    if (count > bounds.max) Wrong(ErrorCode::kLimitExceeded, bounds.expected, at, value);
+    That(count >= bounds.min, at, bounds.expected, ErrorCode::kMalformed, count);
+    That(count <= bounds.max, at, bounds.expected, ErrorCode::kLimitExceeded, count);
   }
 
   void Text(std::string_view text, const Bounds& bounds, const FieldPath& at) {
@@ -76,6 +83,35 @@ class Findings {
     const auto wrong = std::ranges::find_if_not(list, holds);
     if (wrong == list.end()) return;
     Wrong(code, text, Entry(at, static_cast<std::size_t>(wrong - list.begin())));
+  }
+
+  /// Returns the number of entries to copy from a list of a message; 0 if there is no list. If the
+  /// list is too long or not aligned, reports an error and returns 0. Lengths must be checked
+  /// before copying, because many FlatBuffers offsets can refer to the same bytes, so that a
+  /// decoded message could be much larger than its payload.
+  template <typename T>
+  std::size_t CountOf(const flatbuffers::Vector<T>* list, const Bounds& bounds,
+                      const FieldPath& at) {
+    if (list == nullptr) return 0;
+    // The verifier checks only the alignment of the length field, which is 4 bytes.
+    const auto address = reinterpret_cast<std::uintptr_t>(list->Data());
+    const bool is_aligned = address % alignof(std::remove_pointer_t<T>) == 0;
+    That(is_aligned, at, "the list is not aligned", ErrorCode::kMalformed);
+    const std::size_t count = list->size();
+    That(count <= bounds.max, at, bounds.expected, ErrorCode::kLimitExceeded, count);
+    return is_aligned && count <= bounds.max ? count : 0;
+  }
+
+  /// Copies a text or a list of numbers, enums or bytes. A span refers to the list instead.
+  template <typename W, typename List>
+  void Copy(const flatbuffers::Vector<W>* list, const Bounds& bounds, const FieldPath& at,
+            List& out) {
+    using T = typename List::value_type;
+    static_assert(sizeof(W) == sizeof(T));
+    if (const std::size_t count = CountOf(list, bounds, at); count > 0) {
+      const auto* entries = reinterpret_cast<const T*>(list->data());
+      out = List(entries, entries + count);
+    }
   }
 
   [[nodiscard]] Status Result() {

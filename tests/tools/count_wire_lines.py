@@ -19,9 +19,9 @@ PATTERNS = {
     "encoders and decoders": [
         "protocol/include/stridewire/protocol/encoder.h", "protocol/src/encoder.cpp",
         "protocol/include/stridewire/protocol/decode.h", "protocol/src/decode.cpp",
-        "protocol/src/codec_support.h", "protocol/src/unpacker.h"],
+        "protocol/src/codec_support.h"],
     "checks": ["protocol/include/stridewire/protocol/check.h", "protocol/src/check.cpp",
-               "protocol/src/findings.*"],
+               "protocol/src/findings.h"],
     "JSON and vectors": ["protocol/tools/*.cpp", "protocol/tools/*.h"],
     "TypeScript": ["client_sdk/web/src/wire/*.ts", "client_sdk/web/test/support/to_json.ts"],
 }

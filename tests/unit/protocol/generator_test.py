@@ -103,17 +103,15 @@ class CppTest(unittest.TestCase):
 
     def test_checks_every_field(self):
         for line in (
-                'found.That(m.seq != 0, ErrorCode::kOutOfRange, "expected a number other than 0", '
-                'At(at, "seq"));',
+                'found.That(m.seq != 0, At(at, "seq"), "expected a number other than 0");',
                 'found.That(static_cast<unsigned>(m.color) <= 1, At(at, "color"), '
-                'static_cast<int>(m.color), "expected a number from 0 to 1", '
-                'ErrorCode::kMalformed);',
+                '"expected a number from 0 to 1", ErrorCode::kMalformed, '
+                'static_cast<int>(m.color));',
                 'found.Text(m.text, {0, 16, "expected at most 16 bytes"}, At(at, "text"));',
                 'CheckList(found, m.items, {1, kMaxItems, "expected 1 to 65,536 entries"}, '
                 'At(at, "items"));',
                 'if (m.speed_m_s) found.That(std::isfinite(*m.speed_m_s) && *m.speed_m_s >= 0, '
-                'ErrorCode::kOutOfRange, "expected a number of at least 0", '
-                'At(at, "speed_m_s"));'):
+                'At(at, "speed_m_s"), "expected a number of at least 0");'):
             self.assertIn(line, self.source)
 
     def test_comments_state_ranges(self):
@@ -137,13 +135,16 @@ class CppTest(unittest.TestCase):
         }
         table Place { x: double; }""")).codec_source()
         for line in (
-                'm.part < m.parts, At(at, "part"), m.part, "expected a number below parts");',
-                'm.flags.size() == m.ids.size(), At(at, "flags"), m.flags.size(), '
-                '"expected one entry per id", ErrorCode::kShapeMismatch);',
-                'm.token.empty() || m.token.size() >= 16, At(at, "token"), m.token.size(), '
-                '"expected 16 to 64 bytes, or none", ErrorCode::kLimitExceeded);',
-                '!m.moves || m.place, ErrorCode::kMalformed, "moves requires a place", ',
-                '!m.near || !m.exact, ErrorCode::kMalformed, "exact excludes near", '):
+                'm.part < m.parts, At(at, "part"), "expected a number below parts", '
+                'ErrorCode::kOutOfRange, m.part);',
+                'm.flags.size() == m.ids.size(), At(at, "flags"), "expected one entry per id", '
+                'ErrorCode::kShapeMismatch, m.flags.size());',
+                'm.token.empty() || m.token.size() >= 16, At(at, "token"), '
+                '"expected 16 to 64 bytes, or none", ErrorCode::kLimitExceeded, m.token.size());',
+                '!m.moves || m.place, At(at, "moves"), "moves requires a place", '
+                'ErrorCode::kMalformed);',
+                '!m.near || !m.exact, At(at, "exact"), "exact excludes near", '
+                'ErrorCode::kMalformed);'):
             self.assertIn("found.That(" + line, source)
 
     def test_decodes_and_encodes_renamed_and_inverted_members(self):
@@ -177,9 +178,11 @@ class CppTest(unittest.TestCase):
         self.assertIn("std::span<const std::uint32_t> ids;\n  /// At most 9.\n"
                       "  std::vector<std::byte> bytes;\n};",
                       cpp.structs_header())
-        self.assertIn("u.Borrow(w.ids(), {0, 4, ", cpp.codec_source())
-        self.assertIn("const auto bytes = ScalarList(b, m.bytes, !m.ids.empty());\n"
-                      "  const auto ids = ScalarList(b, m.ids, true);", cpp.codec_source())
+        self.assertIn("found.Copy(w.ids(), {0, 4, ", cpp.codec_source())
+        self.assertIn("const auto bytes = m.ids.empty() ? "
+                      "Offset<flatbuffers::Vector<std::uint8_t>>() "
+                      ": b.CreateVector(reinterpret_cast<const std::uint8_t*>(m.bytes.data()), "
+                      "m.bytes.size());\n  const auto ids = b.CreateVector(", cpp.codec_source())
 
     def test_writes_structs_of_groups(self):
         header = Cpp(read("""table Spawn {
@@ -237,13 +240,13 @@ class VariantTest(unittest.TestCase):
 
     def test_copies_only_fields_that_the_type_uses(self):
         source = Cpp(read(VARIANT)).codec_source()
-        for line in ("  if (!m.at) found.That(std::isfinite(m.far), ErrorCode::kOutOfRange, "
-                     "\"expected a finite number\", At(at, \"far\"));",
+        for line in ("  if (!m.at) found.That(std::isfinite(m.far), At(at, \"far\"), "
+                     "\"expected a finite number\");",
                      "  if (!w.at()) m.far = w.far();", "  m.high = w.high();",
-                     "    case wire::Kind::Run: return Unpack(u, at, w, "
+                     "    case wire::Kind::Run: return Unpack(found, at, w, "
                      "m.movement.emplace<RunMovement>());",
                      "  if (!w.seconds()) {\n"
-                     "    return u.Wrong(ErrorCode::kMalformed, \"a run requires seconds\", ",
+                     "    return found.Wrong(ErrorCode::kMalformed, \"a run requires seconds\", ",
                      "  m.seconds = *w.seconds();", "    if (!m.at) far = m.far;",
                      "    if (m.at) at = ToWire(*m.at);"):
             self.assertIn(line, source)
