@@ -340,7 +340,7 @@ TEST(Check, WorldInfo) {
       good, [](W& m) { m.skeleton.joints.resize(kMaxJoints + 1); }, ErrorCode::kLimitExceeded,
       "WorldInfo.skeleton.joints");
   Refused<W>(
-      good, [](W& m) { m.skeleton.end_sites.resize(kMaxEndSites + 1); }, ErrorCode::kLimitExceeded,
+      good, [](W& m) { m.skeleton.end_sites.resize(257); }, ErrorCode::kLimitExceeded,
       "WorldInfo.skeleton.end_sites");
   RefusedTexts<W>(
       good, [](W& m) -> std::string& { return m.skeleton.joints[1].name; }, kMaxNameBytes, false,
@@ -699,7 +699,7 @@ TEST(Check, AvatarStateLandingsAndLayers) {
   using S = AvatarState;
   const S good = GoodState();
   Refused<S>(
-      good, [](S& m) { m.movement->landings.resize(kMaxLandings + 1); }, ErrorCode::kLimitExceeded,
+      good, [](S& m) { m.movement->landings.resize(3); }, ErrorCode::kLimitExceeded,
       "AvatarState.movement.landings");
   Refused<S>(
       good, [](S& m) { m.movement->landings[0].foot = static_cast<FootSide>(2); },
@@ -711,8 +711,8 @@ TEST(Check, AvatarStateLandingsAndLayers) {
       good, [](S& m) -> double& { return m.movement->landings[0].heading_rad; },
       "AvatarState.movement.landings.heading_rad", 0);
   Refused<S>(
-      good, [](S& m) { m.layers.resize(kMaxPlayingLayers + 1, m.layers[0]); },
-      ErrorCode::kLimitExceeded, "AvatarState.layers");
+      good, [](S& m) { m.layers.resize(5, m.layers[0]); }, ErrorCode::kLimitExceeded,
+      "AvatarState.layers");
   RefusedTexts<S>(
       good, [](S& m) -> std::string& { return m.layers[1].layer; }, kMaxNameBytes, false,
       "AvatarState.layers.layer", 1);
@@ -744,8 +744,8 @@ TEST(Check, AvatarStateMovement) {
         "AvatarState.movement.keytimes_s");
   }
   Refused<S>(
-      good, [](S& m) { m.movement->keytimes_s.assign(kMaxKeytimes + 1, 0.0); },
-      ErrorCode::kLimitExceeded, "AvatarState.movement.keytimes_s");
+      good, [](S& m) { m.movement->keytimes_s.assign(10, 0.0); }, ErrorCode::kLimitExceeded,
+      "AvatarState.movement.keytimes_s");
   for (const double generic_time : {-0.1, 3.1, kNaN}) {
     Refused<S>(
         good, [&](S& m) { m.movement->generic_time = generic_time; }, ErrorCode::kOutOfRange,

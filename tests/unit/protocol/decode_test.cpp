@@ -403,7 +403,7 @@ TEST(Decode, LimitsSkeletons) {
                        World(builder, wire::CreateSkeleton(builder, builder.CreateVector(joints)))),
               ErrorCode::kLimitExceeded, "WorldInfo.skeleton.joints");
   builder.Clear();
-  const std::vector sites(kMaxEndSites + 1, wire::CreateEndSite(builder));
+  const std::vector sites(257, wire::CreateEndSite(builder));
   ExpectError(MessageType::kWorldInfo,
               Finished(builder, World(builder, wire::CreateSkeleton(builder, 0,
                                                                     builder.CreateVector(sites)))),
