@@ -38,7 +38,7 @@ export class Client {
   private readonly webSocket: new (url: string) => WebSocketLike;
   private readonly urls: readonly string[];
   private socket: WebSocketLike | null = null;
-  /** `Session.connectionNumber` for which the socket was opened. */
+  /** Number of the connection for which the socket was opened. */
   private socketNumber = 0;
   private timer: ReturnType<typeof setTimeout> | null = null;
   private timerAtS = Infinity;
@@ -159,11 +159,9 @@ export class Client {
     if (this.working) return;
     this.working = true;
     const {session} = this;
-    if (this.socket !== null &&
-        (!session.needsSocket || session.connectionNumber !== this.socketNumber)) {
-      this.dropSocket();
-    }
-    if (session.connectDue(this.nowS())) {
+    const {needsSocket, connectionNumber, connectDue} = session.network(this.nowS());
+    if (needsSocket === 0 || connectionNumber !== this.socketNumber) this.dropSocket();
+    if (connectDue !== 0) {
       session.startConnecting(this.nowS());
       this.openSocket();
     }
@@ -182,15 +180,10 @@ export class Client {
 
   private openSocket(): void {
     const {session} = this;
-    const number = session.connectionNumber;
-    const lost = (code: number, text: string): void => {
-      if (number !== this.socketNumber || this.socket === null) return;
-      this.dropSocket();
-      session.onLost(code, text, this.nowS());
-    };
+    const {connectionNumber, addressIndex} = session.network();
     let socket: WebSocketLike;
     try {
-      socket = new this.webSocket(this.urls[session.addressIndex]!);
+      socket = new this.webSocket(this.urls[addressIndex]!);
     } catch (error) {
       const text = error instanceof Error ? error.message : '';
       queueMicrotask(() => session.onLost(Status.connect_failed, text, this.nowS()));
@@ -198,12 +191,12 @@ export class Client {
     }
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
-    this.socketNumber = number;
+    this.socketNumber = connectionNumber;
     socket.onopen = () => {
-      if (number === this.socketNumber) session.onConnected(this.nowS());
+      if (socket === this.socket) session.onConnected(this.nowS());
     };
     socket.onmessage = ({data}: {data: unknown}) => {
-      if (number !== this.socketNumber) return;
+      if (socket !== this.socket) return;
       if (data instanceof ArrayBuffer) {
         session.onFrame(data, this.nowS());
       } else {
@@ -212,29 +205,27 @@ export class Client {
       if (this.nowS() >= this.timerAtS) this.tick();  // Browsers delay timers of hidden pages.
     };
     socket.onclose = ({reason}: {reason?: string}) => {
+      if (socket !== this.socket) return;
       const connected = session.state !== 'connecting';
-      lost(connected ? Status.connection_lost : Status.connect_failed, reason ?? '');
+      this.dropSocket();
+      session.onLost(connected ? Status.connection_lost : Status.connect_failed, reason ?? '',
+                     this.nowS());
     };
     socket.onerror = () => {};  // A close event follows.
   }
 
   private dropSocket(): void {
-    const socket = this.socket;
-    if (socket === null) return;
-    this.socket = null;
-    socket.onopen = null;
-    socket.onmessage = null;
-    socket.onclose = null;
-    socket.onerror = () => {};
+    const {socket} = this;
+    this.socket = null;  // The listeners of the old socket then do nothing.
     try {
-      socket.close();
+      socket?.close();
     } catch {
       // The socket was closed already.
     }
   }
 
   private setTimer(): void {
-    const nextS = this.session.nextTimeS;
+    const {nextTimeS: nextS} = this.session.network();
     if (this.timer !== null && this.timerAtS <= nextS) return;
     if (this.timer !== null) clearTimeout(this.timer);
     this.timer = null;

@@ -69,17 +69,21 @@ class Native {
     return this.call.memory.buffer;
   }
 
-  /** Copies bytes to the memory for arguments. */
-  setInput(bytes: Uint8Array): void {
-    const at = this.call.input(bytes.length);
+  /** Copies lists of bytes to the memory for arguments, one after the other, and returns their
+   * number. */
+  setInput(...lists: Uint8Array[]): number {
+    const count = lists.reduce((sum, {length}) => sum + length, 0);
+    let at = this.call.input(count);
     this.refresh();
-    this.memory.set(bytes, at);
+    for (const bytes of lists) {
+      this.memory.set(bytes, at);
+      at += bytes.length;
+    }
+    return count;
   }
 
   setInputText(text: string): number {
-    const bytes = encoder.encode(text);
-    this.setInput(bytes);
-    return bytes.length;
+    return this.setInput(encoder.encode(text));
   }
 
   /** If the module has stopped, returns an error that contains the text that the module printed. */

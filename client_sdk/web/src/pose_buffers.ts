@@ -1,3 +1,4 @@
+import {MemoryView, native} from './native';
 import type {CrowdPose, Pose} from './types';
 
 /**
@@ -31,22 +32,39 @@ export function createCrowdPose(count = 0, jointCount = 0): CrowdPose {
   return out;
 }
 
-/** Enlarges `out` until `count` avatars fit into it. Keeps its contents. @internal */
-export function reserve(out: CrowdPose, count: number, jointCount: number): void {
+/** Replaces arrays of `out` that are too small for `count` avatars. */
+function reserve(out: CrowdPose, count: number, jointCount: number): void {
   if (out.avatars.length < count) {
     // Allocates a quarter more than necessary, so that a growing crowd does not reallocate for
     // every avatar.
     const capacity = Math.ceil(count * 1.25);
-    out.avatars = copyInto(new Uint32Array(capacity), out.avatars);
-    out.flags = copyInto(new Uint8Array(capacity), out.flags);
-    out.rootsM = copyInto(new Float32Array(3 * capacity), out.rootsM);
+    out.avatars = new Uint32Array(capacity);
+    out.flags = new Uint8Array(capacity);
+    out.rootsM = new Float32Array(3 * capacity);
   }
   if (out.rotations.length < 4 * count * jointCount) {
-    out.rotations = copyInto(new Float32Array(4 * out.avatars.length * jointCount), out.rotations);
+    out.rotations = new Float32Array(4 * out.avatars.length * jointCount);
   }
 }
 
-function copyInto<T extends Uint32Array | Uint8Array | Float32Array>(to: T, from: T): T {
-  to.set(from as never);
-  return to;
+/** Copies crowds from the WebAssembly module, whose memory moves when it grows. @internal */
+export class CrowdReader {
+  private readonly ids = new MemoryView(Uint32Array);
+  private readonly flags = new MemoryView(Uint8Array);
+  private readonly roots = new MemoryView(Float32Array);
+  private readonly rotations = new MemoryView(Float32Array);
+
+  /** Copies the `count` poses that a function has returned (client_module.cpp, `sample_all`). */
+  read(count: number, out: CrowdPose): number {
+    const {results} = native();
+    const joints = results[0]!;
+    reserve(out, count, joints);
+    out.avatars.set(this.ids.get(results[1]!, count));
+    out.flags.set(this.flags.get(results[2]!, count));
+    out.rootsM.set(this.roots.get(results[3]!, 3 * count));
+    out.rotations.set(this.rotations.get(results[4]!, 4 * joints * count));
+    out.count = count;
+    out.jointCount = joints;
+    return count;
+  }
 }

@@ -1,39 +1,32 @@
 import type {CrowdPose, Recording, WorldEvent} from './types';
+import type {WorldHandle} from './world';
 
 /** Estimated memory of an event. */
 const eventBytes = 400;
 
-/** The part of a recording that the WebAssembly module keeps: the poses. */
-export interface PoseRecording {
-  readonly firstTimeS: number;
-  readonly lastTimeS: number;
-  readonly bytes: number;
-  sampleAll(timeS: number, out: CrowdPose): number;
-  clear(): void;
-}
-
-/** The last seconds of a world, as the client received them. */
+/** The last seconds of a world. The WebAssembly module keeps the poses, this class the events. */
 export class WorldRecording implements Recording {
   private eventList: WorldEvent[] = [];
   private firstEvent = 0;
 
-  constructor(private readonly poses: PoseRecording, private readonly lengthS: number,
+  constructor(private readonly world: WorldHandle, private readonly lengthS: number,
               private readonly maxEvents: number) {}
 
   get firstTimeS(): number {
-    return this.poses.firstTimeS;
+    return this.world.stateNumbers()?.[3] ?? NaN;
   }
 
   get lastTimeS(): number {
-    return this.poses.lastTimeS;
+    return this.world.stateNumbers()?.[4] ?? NaN;
   }
 
   get bytes(): number {
-    return this.poses.bytes + (this.eventList.length - this.firstEvent) * eventBytes;
+    const poseBytes = this.world.stateNumbers()?.[2] ?? 0;
+    return poseBytes + (this.eventList.length - this.firstEvent) * eventBytes;
   }
 
   clear(): void {
-    this.poses.clear();
+    this.world.clearPoseRecording();
     this.clearEvents();
   }
 
@@ -62,6 +55,6 @@ export class WorldRecording implements Recording {
   }
 
   sampleAll(timeS: number, out: CrowdPose): number {
-    return this.poses.sampleAll(timeS, out);
+    return this.world.sampleCrowd(timeS, out, true);
   }
 }

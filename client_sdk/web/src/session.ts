@@ -26,6 +26,9 @@ const cacheTimeoutS = 5;
 /** States of the module, in the order of their numbers. */
 const states: readonly ClientState[] =
     ['idle', 'waiting', 'connecting', 'handshake', 'ready', 'closing', 'closed'];
+/** Messages that contain something which the module does not process. */
+const userMessages: readonly number[] =
+    [MessageType.WorldInfo, MessageType.Events, MessageType.AvatarState];
 const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
 /** Results of `statistics`, in their order: from index 0 on, and from index 16 on. */
 const playoutNames = [
@@ -36,6 +39,11 @@ const countNames = [
   'bytesSent', 'batchesReceived', 'posesReceived', 'posesRefused', 'batchesMissing',
   'batchesDropped', 'commandsSent', 'commandsResent', 'commandsWaiting', 'connects', 'resumes',
   'connectFailures', 'bufferedBytes', 'rttS',
+] as const;
+
+/** Results of `state`. */
+const networkNames = [
+  'nextTimeS', 'connectDue', 'needsSocket', 'connectionNumber', 'outputBytes', 'addressIndex',
 ] as const;
 
 /** Returns an object whose properties are numbers of `results`. */
@@ -74,11 +82,12 @@ export class Session {
   /** Address of the client in the module. */
   readonly client: number;
 
-  private stateNow: ClientState = 'idle';
-  private lastErrorText = '';
+  state: ClientState = 'idle';
+  lastError = '';
   private readonly worlds = new Set<WorldHandle>();
   private nextSubscription = 1;
-  private nextRequestId = 1n;
+  /** The next id for a request without an id. */
+  nextRequestId = 1n;
   private readonly pending = new Map<number, Pending>();
   private readonly inspections = new Map<bigint, Inspection>();
   private lastEventsNumber = 0n;
@@ -109,20 +118,10 @@ export class Session {
 
   // ---- Calls of the user.
 
-  get state(): ClientState {
-    return this.stateNow;
-  }
-  get lastError(): string {
-    return this.lastErrorText;
-  }
   get tickHz(): number {
     native().call.statistics(this.client, 0);
-    return native().results[playoutNames.indexOf('tickHz')]!;
+    return named(playoutNames, 0).tickHz;
   }
-  nextRequest(): bigint {
-    return this.nextRequestId++;
-  }
-
   /** Returns the server time; NaN if it is not known yet. */
   serverTimeS(nowS: number): number {
     return native().call.server_time(this.client, nowS);
@@ -135,7 +134,7 @@ export class Session {
   /** Starts to connect. Does nothing if already open. `addressIndex` is an index in `urls`. */
   open(nowS: number, urls: readonly string[] = ['']): void {
     if (this.isOpen()) return;
-    this.lastErrorText = '';
+    this.lastError = '';
     this.run(() => {
       const bytes = native().setInputText(urls.map((url) => `${url}\n`).join(''));
       native().call.open(this.client, bytes, nowS);
@@ -292,35 +291,15 @@ export class Session {
 
   // ---- Calls of the network. Times must not decrease.
 
-  /** Returns true if a connection attempt is due; then call startConnecting. */
-  connectDue(nowS: number): boolean {
-    return this.stateNumber(1, nowS) !== 0;
-  }
-
-  /** Increases with every connection, so that late frames of an old one are recognised. */
-  get connectionNumber(): number {
-    return this.stateNumber(3);
-  }
-
-  /** Returns the index of the address for the attempt that `startConnecting` has begun. */
-  get addressIndex(): number {
-    return this.stateNumber(5);
-  }
-
-  /** Returns true if this state needs a socket. If not, the network closes it. */
-  get needsSocket(): boolean {
-    return this.stateNumber(2) !== 0;
-  }
-
-  /** Returns the next time at which to call advanceTime or connectDue; Infinity: never. */
-  get nextTimeS(): number {
-    return this.stateNumber(0);
-  }
-
-  /** Returns a result of `state`. */
-  private stateNumber(index: number, nowS = 0): number {
+  /**
+   * Returns what the network needs to know; bools are 0 or 1. `nextTimeS`: time at which to call
+   * `advanceTime` or this function; Infinity: never. `connectDue`: call `startConnecting`, and
+   * connect to the address with the index `addressIndex`. `needsSocket`: if not, close the socket.
+   * `connectionNumber` increases with every connection.
+   */
+  network(nowS = 0): {[name in (typeof networkNames)[number]]: number} {
     native().call.state(this.client, nowS);
-    return native().results[index]!;
+    return named(networkNames, 0);
   }
 
   startConnecting(nowS: number): void {
@@ -333,7 +312,7 @@ export class Session {
 
   /** Processes a received frame. Never throws, whatever the frame contains. */
   onFrame(frame: ArrayBuffer, nowS: number): void {
-    if (this.stateNow !== 'handshake' && this.stateNow !== 'ready') return;
+    if (this.state !== 'handshake' && this.state !== 'ready') return;
     this.nowS = nowS;
     this.total.bytesReceived += frame.byteLength;
     ++this.total.framesReceived;
@@ -351,7 +330,7 @@ export class Session {
 
   /** Call it if the server sent something other than a binary message. */
   onInvalid(text: string, nowS: number): void {
-    if (this.stateNow !== 'handshake' && this.stateNow !== 'ready') return;
+    if (this.state !== 'handshake' && this.state !== 'ready') return;
     this.onLost(Status.protocol_error, text, nowS);
   }
 
@@ -399,8 +378,7 @@ export class Session {
   // ---- Commands.
 
   private isOpen(): boolean {
-    return this.stateNow === 'waiting' || this.stateNow === 'connecting' ||
-        this.stateNow === 'handshake' || this.stateNow === 'ready';
+    return ['waiting', 'connecting', 'handshake', 'ready'].includes(this.state);
   }
 
   /** Sends a message to the module. The numbers that it returns are in `native().results`. */
@@ -415,13 +393,11 @@ export class Session {
    * @throws StridewireError the module refuses the command */
   private submit(world: WorldHandle, message: Draft,
                  answer: (reply: Reply) => void): number {
-    if (!this.worlds.has(world) || world.state === 'refused' || world.state === 'left') {
+    const joins =
+        this.worlds.has(world) && world.state !== 'refused' && world.state !== 'left';
+    if (!joins || !this.isOpen()) {
       checkMessage(message);
-      throw new StridewireError(Status.not_joined, '');
-    }
-    if (!this.isOpen()) {
-      checkMessage(message);
-      throw new StridewireError(Status.closed, '');
+      throw new StridewireError(joins ? Status.closed : Status.not_joined, '');
     }
     const {code, text} = this.call(world, message);
     if (code !== 0) throw new StridewireError(code, text);
@@ -526,11 +502,8 @@ export class Session {
   private onLibrary(hash: string, file: Uint8Array | null): void {
     const key = new TextEncoder().encode(hash);
     const bytes = file instanceof Uint8Array ? file : new Uint8Array(0);
-    const input = new Uint8Array(key.length + bytes.length);
-    input.set(key);
-    input.set(bytes, key.length);
     this.run(() => {
-      native().setInput(input);
+      native().setInput(key, bytes);
       native().call.on_library(this.client, key.length, bytes.length);
     });
   }
@@ -600,33 +573,24 @@ export class Session {
         default: break;
       }
     }
-    if (accepted) this.onMessage(type, read);
+    if (accepted && userMessages.includes(type)) this.onMessage(read());
   }
 
   /** Handles the parts of messages that the module leaves to this class. */
-  private onMessage(type: number, read: () => Message): void {
-    switch (type) {
-      case MessageType.WorldInfo: {
-        const info = read();
-        const world = info.type === 'WorldInfo' ? this.findServerWorld(info.world) : undefined;
-        if (info.type !== 'WorldInfo' || world === undefined) break;
-        world.setInfo(info);
-        this.later(() => world.listeners.emit('state', world.state));
-        break;
-      }
-      case MessageType.Events: this.onEvents(read() as Events); break;
-      case MessageType.AvatarState: {
-        const state = read();
-        if (state.type !== 'AvatarState') break;
-        const inspection = this.inspections.get(state.nonce);
-        if (inspection === undefined) break;
-        this.inspections.delete(state.nonce);
-        this.later(() => state.code === Status.ok
-            ? inspection.resolve(avatarStateOf(state))
-            : inspection.reject(new StridewireError(state.code, state.text)));
-        break;
-      }
-      default: break;
+  private onMessage(message: Message): void {
+    if (message.type === 'Events') {
+      this.onEvents(message);
+    } else if (message.type === 'WorldInfo') {
+      const world = this.findServerWorld(message.world);
+      if (world === undefined) return;
+      world.setInfo(message);
+      this.later(() => world.listeners.emit('state', world.state));
+    } else if (message.type === 'AvatarState') {
+      const {nonce, code, text} = message;
+      const inspection = this.inspections.get(nonce);
+      this.inspections.delete(nonce);
+      this.later(() => code === Status.ok ? inspection?.resolve(avatarStateOf(message))
+                                          : inspection?.reject(new StridewireError(code, text)));
     }
   }
 
@@ -648,11 +612,7 @@ export class Session {
   }
 
   private findWorld(handle: number): WorldHandle | undefined {
-    if (handle === 0) return undefined;
-    for (const world of this.worlds) {
-      if (world.handle === handle) return world;
-    }
-    return undefined;
+    return handle === 0 ? undefined : [...this.worlds].find((world) => world.handle === handle);
   }
 
   private findServerWorld(id: number): WorldHandle | undefined {
@@ -661,7 +621,7 @@ export class Session {
 
   private onError(status: number, text: string): void {
     const sentence = text || statusText(status);
-    this.lastErrorText = sentence;
+    this.lastError = sentence;
     this.later(() => this.listeners.emit('error', status, sentence));
   }
 
@@ -698,8 +658,8 @@ export class Session {
       }
       this.inspections.clear();
     }
-    if (state !== this.stateNow) {
-      this.stateNow = state;
+    if (state !== this.state) {
+      this.state = state;
       this.later(() => this.listeners.emit('state', state));
     }
     for (const world of [...this.worlds]) {

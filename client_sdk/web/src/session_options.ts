@@ -40,11 +40,7 @@ export function createClient(options: SessionOptions): number {
       options.maxRecordingBytes, options.connectTimeoutS, options.pingIntervalS,
       Number(options.respawn), options.seed, options.renderDelayS,
       Number(options.libraryCache !== null));
-  const input = new Uint8Array(numbers.byteLength + name.length + token.length);
-  input.set(new Uint8Array(numbers.buffer));
-  input.set(name, numbers.byteLength);
-  input.set(token, numbers.byteLength + name.length);
-  native().setInput(input);
+  native().setInput(new Uint8Array(numbers.buffer), name, token);
   const client = native().call.create(name.length, token.length);
   if (client === 0) throw new TypeError(webNames(native().text));
   return client;

@@ -1,7 +1,7 @@
 /** Tools for programs that test implementations of the protocol. */
 import {MessageType, type Message} from '../generated/messages';
 import {native} from './native';
-import {createCrowdPose, reserve} from './pose_buffers';
+import {createCrowdPose, CrowdReader} from './pose_buffers';
 import type {CrowdPose} from './types';
 import {readMessage, typeOfFrame, writeMessage} from './wire/frame';
 
@@ -51,22 +51,10 @@ export function encodeMessage(message: Message): ArrayBuffer {
  * @throws Error the batch or one of its poses is invalid
  */
 export function decodePoses(batch: ArrayBuffer, info = new ArrayBuffer(0)): CrowdPose {
-  const input = new Uint8Array(info.byteLength + batch.byteLength);
-  input.set(new Uint8Array(info));
-  input.set(new Uint8Array(batch), info.byteLength);
-  native().setInput(input);
+  native().setInput(new Uint8Array(info), new Uint8Array(batch));
   const count = native().call.decode_poses(info.byteLength, batch.byteLength);
   if (count < 0) throw new Error(native().text);
-  const [joints, idsAt, flagsAt, rootsAt, rotationsAt] =
-      [...native().results.subarray(0, 5)] as [number, number, number, number, number];
   const out = createCrowdPose();
-  reserve(out, count, joints);
-  out.count = count;
-  out.jointCount = joints;
-  const {memoryBuffer: memory} = native();
-  out.avatars.set(new Uint32Array(memory, idsAt, count));
-  out.flags.set(new Uint8Array(memory, flagsAt, count));
-  out.rootsM.set(new Float32Array(memory, rootsAt, 3 * count));
-  out.rotations.set(new Float32Array(memory, rotationsAt, 4 * joints * count));
+  new CrowdReader().read(count, out);
   return out;
 }

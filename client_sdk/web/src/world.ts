@@ -1,6 +1,6 @@
 import {Listeners} from './listeners';
 import {MemoryView, native} from './native';
-import {reserve} from './pose_buffers';
+import {CrowdReader} from './pose_buffers';
 import {WorldRecording} from './recording';
 import type {Session} from './session';
 import {
@@ -48,22 +48,14 @@ export class WorldHandle implements World {
   private listRevision = 0;
   private listHandle = 0;
 
-  private readonly ids = new MemoryView(Uint32Array);
-  private readonly flags = new MemoryView(Uint8Array);
+  private readonly crowds = new CrowdReader();
   private readonly roots = new MemoryView(Float32Array);
   private readonly rotations = new MemoryView(Float32Array);
 
   constructor(private readonly session: Session, readonly name: string, readonly role: Role,
               recordingS: number, maxRecordedEvents: number) {
     this.joined = new Promise((resolve) => this.answerJoin = resolve);
-    const world = this;
-    this.record = new WorldRecording({
-      get bytes() { return world.stateNumbers()?.[2] ?? 0; },
-      get firstTimeS() { return world.stateNumbers()?.[3] ?? NaN; },
-      get lastTimeS() { return world.stateNumbers()?.[4] ?? NaN; },
-      sampleAll: (timeS, out) => this.sampleCrowd(timeS, out, true),
-      clear: () => native().call.clear_recording(session.client, this.handle),
-    }, recordingS, maxRecordedEvents);
+    this.record = new WorldRecording(this, recordingS, maxRecordedEvents);
   }
 
   get recording(): Recording {
@@ -84,7 +76,7 @@ export class WorldHandle implements World {
 
   request(items: readonly MovementRequest[]): Promise<Reply> {
     return this.session.command(
-        this, () => commands.request(items, () => this.session.nextRequest()));
+        this, () => commands.request(items, () => this.session.nextRequestId++));
   }
 
   setTerrain(terrain: Terrain | null): Promise<Reply> {
@@ -121,7 +113,7 @@ export class WorldHandle implements World {
       this.listRevision = revision;
       this.listHandle = this.handle;
       const count = native().call.avatars(this.session.client, this.handle);
-      this.list = this.ids.get(native().results[0]!, count).slice();
+      this.list = new Uint32Array(native().memoryBuffer, native().results[0], count).slice();
     }
     return this.list;
   }
@@ -149,21 +141,13 @@ export class WorldHandle implements World {
     return this.sampleCrowd(timeS, out, false);
   }
 
-  /** Copies the poses to the caller's arrays, because the memory of the module moves when it
-   * grows. */
-  private sampleCrowd(timeS: number, out: CrowdPose, recorded: boolean): number {
-    const count =
-        native().call.sample_all(this.session.client, this.handle, timeS, Number(recorded));
-    const {results} = native();
-    const joints = results[0]!;
-    reserve(out, count, joints);
-    out.avatars.set(this.ids.get(results[1]!, count));
-    out.flags.set(this.flags.get(results[2]!, count));
-    out.rootsM.set(this.roots.get(results[3]!, 3 * count));
-    out.rotations.set(this.rotations.get(results[4]!, 4 * joints * count));
-    out.count = count;
-    out.jointCount = joints;
-    return count;
+  sampleCrowd(timeS: number, out: CrowdPose, recorded: boolean): number {
+    return this.crowds.read(
+        native().call.sample_all(this.session.client, this.handle, timeS, Number(recorded)), out);
+  }
+
+  clearPoseRecording(): void {
+    native().call.clear_recording(this.session.client, this.handle);
   }
 
   /** Returns the results of `world_state`, or null if the module does not know this world. */

@@ -233,14 +233,14 @@ test('doubles the reconnect delay up to a limit, with jitter', () => {
   h.session.open(h.nowS);
   const waits: number[] = [];
   for (let i = 0; i < 12; ++i) {
-    assert.ok(h.session.connectDue(h.nowS));
+    assert.ok(h.session.network(h.nowS).connectDue);
     h.session.startConnecting(h.nowS);
     h.session.onLost(Status.connect_failed, '', h.nowS);
-    const waitS = h.session.nextTimeS - h.nowS;
+    const waitS = h.session.network().nextTimeS - h.nowS;
     const most = Math.min(0.1 * 2 ** i, 5);
     assert.ok(waitS >= most / 2 - 1e-9 && waitS <= most + 1e-9, `${i}: ${waitS}`);
     waits.push(waitS / most);
-    assert.ok(!h.session.connectDue(h.nowS + waitS - 0.001));
+    assert.ok(!h.session.network(h.nowS + waitS - 0.001).connectDue);
     h.nowS += waitS + 0.001;
   }
   assert.equal(new Set(waits).size, waits.length);
@@ -248,11 +248,11 @@ test('doubles the reconnect delay up to a limit, with jitter', () => {
   h.connect();
   h.nowS += 1;
   h.lose();
-  assert.ok(h.session.nextTimeS - h.nowS > 2);
+  assert.ok(h.session.network().nextTimeS - h.nowS > 2);
   h.connect();
   h.nowS += 3;
   h.lose();
-  assert.ok(h.session.nextTimeS - h.nowS <= 0.1);
+  assert.ok(h.session.network().nextTimeS - h.nowS <= 0.1);
 });
 
 test('times out if the server is silent, and pings before its idle timeout', () => {

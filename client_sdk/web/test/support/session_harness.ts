@@ -25,7 +25,7 @@ export class Harness {
   /** Connects, completes the handshake and returns the client's Hello. */
   connect(fields: server.WelcomeFields = {}): Message {
     this.session.open(this.nowS);
-    while (!this.session.connectDue(this.nowS)) this.nowS += 0.05;
+    while (!this.session.network(this.nowS).connectDue) this.nowS += 0.05;
     this.session.startConnecting(this.nowS);
     this.session.onConnected(this.nowS);
     const hello = this.sent();
