@@ -1,4 +1,5 @@
 import {defaultLibraryCache} from './library_cache';
+import {native} from './native';
 import {Session} from './session';
 import {defaultOptions} from './session_options';
 import {Status} from './status';
@@ -95,7 +96,7 @@ export class Client {
 
   /** Ticks per second of the server; 60 before the first connection. */
   get tickHz(): number {
-    return this.session.tickHz;
+    return native().call.tick_hz(this.session.client);
   }
 
   get statistics(): Statistics {

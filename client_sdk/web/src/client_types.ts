@@ -1,4 +1,5 @@
 /** Public types for the connection of a client to a server. */
+import type {NativeStatistics} from '../generated/native';
 
 /**
  * State of a client's connection.
@@ -128,64 +129,25 @@ export interface ClientListeners {
   error: (code: number, text: string) => void;
 }
 
-/** Counters since the client was created, and current measurements. */
-export interface Statistics {
-  bytesReceived: number;
+/**
+ * Counters since the client was created, and current measurements. `bufferedBytes` also contains
+ * recordings and what the socket has not sent yet.
+ */
+export interface Statistics extends NativeStatistics {
   /** Bytes of pose messages, headers included. */
   poseBytesReceived: number;
   /** Bytes of motion libraries that the client has fetched from the server. */
   libraryBytesReceived: number;
-  bytesSent: number;
   framesReceived: number;
-  /** Pose messages received. */
-  batchesReceived: number;
-  posesReceived: number;
-  /**
-   * Received poses that were discarded because they were old or their avatar did not fit into
-   * `maxPoseBytes`.
-   */
-  posesRefused: number;
-  /** Pose messages that did not arrive, according to gaps in the ticks. */
-  batchesMissing: number;
-  /** Pose messages that the server dropped because the client read too slowly. */
-  batchesDropped: number;
   /** Events that the server dropped because the client read too slowly. */
   eventsDropped: number;
-  eventsReceived: number;
   /** Received frames that were malformed. Each one ended its connection. */
   invalidFrames: number;
-  commandsSent: number;
-  /** Commands sent again after a reconnect. */
-  commandsResent: number;
-  /** Commands whose reply has not arrived yet. */
-  commandsWaiting: number;
-  /** Connections that became ready. */
-  connects: number;
-  /** Connections that continued the previous session. */
-  resumes: number;
   /** Connections that became ready after the first one. */
   reconnects: number;
-  connectFailures: number;
-  /** Smallest round trip of the last 16 pings; 0 before the first reply. */
-  rttS: number;
-  /** Mean lateness of pose messages relative to the fastest message of the last 4 s. */
-  jitterS: number;
-  /** Largest lateness of the last 4 s. */
-  worstJitterS: number;
-  /** Delay of `Client.renderTimeS` behind server time now, and the delay that it approaches. */
-  renderDelayS: number;
-  targetDelayS: number;
-  /** Server time that has passed since the newest pose message. */
-  newestAgeS: number;
   /** Smoothed time from the sampled time to the newest received pose. Negative if samples are newer
    * than all poses, so that poses are extrapolated or held. */
   interpolationDelayS: number;
-  /** Samples after the newest received pose of their avatar, while its motion still continued. */
-  extrapolatedSamples: number;
-  /** Samples after the newest received pose of their avatar, when its motion had stopped. */
-  heldSamples: number;
   /** Mean time in nanoseconds to decode and store a pose. */
   decodeNsPerPose: number;
-  /** Memory of poses, recordings and unsent messages now. */
-  bufferedBytes: number;
 }

@@ -11,7 +11,7 @@ import type {
 import {
   MessageType, type Events, type Message, type Reply as ReplyMessage
 } from '../generated/messages';
-import {NativeEvent} from '../generated/native';
+import {NativeEvent, readStatistics} from '../generated/native';
 import * as commands from './wire/commands';
 import {avatarStateOf, eventOf} from './wire/convert';
 import {Malformed} from './wire/check';
@@ -30,28 +30,11 @@ const states: readonly ClientState[] =
 const userMessages: readonly number[] =
     [MessageType.WorldInfo, MessageType.Events, MessageType.AvatarState];
 const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
-/** Results of `statistics`, in their order: from index 0 on, and from index 16 on. */
-const playoutNames = [
-  'jitterS', 'worstJitterS', 'heldSamples', 'tickHz', 'renderDelayS', 'targetDelayS', 'newestAgeS',
-  'extrapolatedSamples',
-] as const;
-const countNames = [
-  'bytesSent', 'batchesReceived', 'posesReceived', 'posesRefused', 'batchesMissing',
-  'batchesDropped', 'commandsSent', 'commandsResent', 'commandsWaiting', 'connects', 'resumes',
-  'connectFailures', 'bufferedBytes', 'rttS',
-] as const;
 
 /** Results of `state`. */
 const networkNames = [
   'nextTimeS', 'connectDue', 'needsSocket', 'connectionNumber', 'outputBytes', 'addressIndex',
 ] as const;
-
-/** Returns an object whose properties are numbers of `results`. */
-function named<K extends string>(names: readonly K[], first: number): {[name in K]: number} {
-  const {results} = native();
-  return Object.fromEntries(names.map((name, i) => [name, results[first + i]])) as
-      {[name in K]: number};
-}
 
 interface Pending {
   readonly world: WorldHandle;
@@ -99,8 +82,8 @@ export class Session {
   private readonly notifications: (() => void)[] = [];
   private notifying = false;
   private readonly total = {
-    bytesReceived: 0, poseBytesReceived: 0, libraryBytesReceived: 0, framesReceived: 0,
-    eventsReceived: 0, eventsDropped: 0, invalidFrames: 0,
+    poseBytesReceived: 0, libraryBytesReceived: 0, framesReceived: 0, eventsDropped: 0,
+    invalidFrames: 0,
   };
   private decodeMs = 0;
   private interpolationDelayS = 0;
@@ -118,10 +101,6 @@ export class Session {
 
   // ---- Calls of the user.
 
-  get tickHz(): number {
-    native().call.statistics(this.client, 0);
-    return named(playoutNames, 0).tickHz;
-  }
   /** Returns the server time; NaN if it is not known yet. */
   serverTimeS(nowS: number): number {
     return native().call.server_time(this.client, nowS);
@@ -268,14 +247,13 @@ export class Session {
   }
 
   statistics(nowS = 0): Statistics {
-    native().call.statistics(this.client, nowS);
-    const {tickHz: _, ...playout} = named(playoutNames, 0);
-    const counts = named(countNames, 16);
+    const address = native().call.statistics(this.client, nowS);
+    const counts = readStatistics(new DataView(native().memoryBuffer, address));
     const {connects, posesReceived} = counts;
     let bufferedBytes = counts.bufferedBytes + this.socketBytes();
     for (const world of this.worlds) bufferedBytes += world.record.bytes;
     return {
-      ...this.total, ...playout, ...counts, bufferedBytes,
+      ...counts, ...this.total, bufferedBytes,
       reconnects: Math.max(0, connects - 1),
       interpolationDelayS: this.interpolationDelayS,
       decodeNsPerPose: posesReceived === 0 ? 0 : 1e6 * this.decodeMs / posesReceived,
@@ -299,7 +277,8 @@ export class Session {
    */
   network(nowS = 0): {[name in (typeof networkNames)[number]]: number} {
     native().call.state(this.client, nowS);
-    return named(networkNames, 0);
+    const {results} = native();
+    return Object.fromEntries(networkNames.map((name, i) => [name, results[i]])) as never;
   }
 
   startConnecting(nowS: number): void {
@@ -314,7 +293,6 @@ export class Session {
   onFrame(frame: ArrayBuffer, nowS: number): void {
     if (this.state !== 'handshake' && this.state !== 'ready') return;
     this.nowS = nowS;
-    this.total.bytesReceived += frame.byteLength;
     ++this.total.framesReceived;
     const type = typeOfFrame(frame);
     const hasPoses = type === MessageType.PoseBatch || type === MessageType.Movements;
@@ -603,7 +581,6 @@ export class Session {
     const world = this.findServerWorld(message.world);
     if (world === undefined) return;
     for (const event of message.events.map(eventOf)) {
-      ++this.total.eventsReceived;
       world.record.addEvent(event);
       if (world.listeners.has('event')) {
         this.later(() => world.listeners.emit('event', event));

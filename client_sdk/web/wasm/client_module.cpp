@@ -280,10 +280,10 @@ STRIDEWIRE_EXPORT(describe_status) void DescribeStatus(stridewire_status status,
 
 // ---- a client
 
-/// Creates a client. `input` contains 11 numbers, in the order in which this function reads them,
-/// and then the client's name and token. Returns null and sets the text if a text is invalid.
+/// Creates a client. `input` contains 12 numbers, in the order of src/session_options.ts, and then
+/// the client's name and token. Returns null and sets the text if a text is invalid.
 STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t token_bytes) {
-  std::array<double, 11> numbers;
+  std::array<double, 12> numbers;
   const auto input = Input(sizeof numbers + name_bytes + token_bytes);
   std::memcpy(numbers.data(), input.data(), sizeof numbers);
   const auto* texts = reinterpret_cast<const char*>(input.data() + sizeof numbers);
@@ -308,12 +308,12 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.max_recording_bytes = static_cast<std::size_t>(std::min(numbers[4], kMaxBytes));
   options.connect_timeout_s = numbers[5];
   options.ping_interval_s = numbers[6];
-  options.respawn = numbers[7] != 0.0;
+  options.render_delay_s = numbers[7];
   options.seed = static_cast<std::uint64_t>(numbers[8]);
-  options.render_delay_s = numbers[9];
+  options.respawn = numbers[10] != 0.0;  // numbers[9] limits the events, which the module ignores.
   options.detailed_events = false;
   auto client = std::make_unique<Client>(options);
-  client->has_library_cache = numbers[10] != 0.0;
+  client->has_library_cache = numbers[11] != 0.0;
   return client.release();
 }
 
@@ -452,29 +452,17 @@ std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes)
   return Report(*client, status, command);
 }
 
-/// results: the array `playout` from index 0 on, and the array `numbers` from index 16 on.
-STRIDEWIRE_EXPORT(statistics) void Statistics(Client* client, double now_s) {
-  const stridewire_statistics s = client->session.Statistics();
-  const double numbers[] = {
-      static_cast<double>(s.bytes_sent),       static_cast<double>(s.batches_received),
-      static_cast<double>(s.poses_received),   static_cast<double>(s.poses_refused),
-      static_cast<double>(s.batches_missing),  static_cast<double>(s.dropped_batches),
-      static_cast<double>(s.commands_sent),    static_cast<double>(s.commands_resent),
-      static_cast<double>(s.commands_waiting), static_cast<double>(s.connects),
-      static_cast<double>(s.resumes),          static_cast<double>(s.connect_failures),
-      static_cast<double>(s.buffered_bytes),   s.rtt_s};
-  std::memcpy(results.data() + 16, numbers, sizeof numbers);
-  const stridewire_playout p = client->session.Playout(now_s);
-  const double playout[] = {p.jitter_s,
-                            p.worst_jitter_s,
-                            static_cast<double>(p.held_poses),
-                            client->session.tick_hz(),
-                            p.delay_s,
-                            p.target_delay_s,
-                            p.newest_age_s,
-                            static_cast<double>(p.extrapolated_poses)};
-  std::memcpy(results.data(), playout, sizeof playout);
+/// Returns the address of a stridewire_statistics, which a stridewire_playout follows.
+STRIDEWIRE_EXPORT(statistics) const void* Statistics(Client* client, double now_s) {
+  static struct {
+    stridewire_statistics statistics;
+    stridewire_playout playout;
+  } result;
+  result = {client->session.Statistics(), client->session.Playout(now_s)};
+  return &result;
 }
+
+STRIDEWIRE_EXPORT(tick_hz) double TickHz(Client* client) { return client->session.tick_hz(); }
 
 /// Returns the server time at `now_s`; NaN if it is not known yet.
 STRIDEWIRE_EXPORT(server_time) double ServerTime(Client* client, double now_s) {
