@@ -109,8 +109,7 @@ export class Client {
    * arrives now with this smallest delay.
    */
   serverTimeS(): number | null {
-    const timeS = this.session.serverTimeS(this.nowS());
-    return Number.isNaN(timeS) ? null : timeS;
+    return known(native().call.server_time(this.session.client, this.nowS()));
   }
 
   /**
@@ -121,8 +120,7 @@ export class Client {
    * longer than necessary. Sampled poses then belong to another segment.
    */
   renderTimeS(): number | null {
-    const timeS = this.session.renderTimeS(this.nowS());
-    return Number.isNaN(timeS) ? null : timeS;
+    return known(native().call.render_time(this.session.client, this.nowS()));
   }
 
   /** Starts to connect and returns at once. Does nothing if already connected or connecting. */
@@ -243,4 +241,9 @@ export class Client {
     this.session.advanceTime(this.nowS());
     this.work();
   }
+}
+
+/** The module returns NaN for a time that is not known yet. */
+function known(timeS: number): number | null {
+  return Number.isNaN(timeS) ? null : timeS;
 }

@@ -5,9 +5,8 @@ export class Listeners<L extends {[K in keyof L]: (...args: never[]) => void}> {
 
   /** Adds a listener and returns a function that removes it. */
   on<K extends keyof L>(name: K, listener: L[K]): () => void {
-    let list = this.lists.get(name);
-    if (list === undefined) this.lists.set(name, list = new Set());
-    list.add(listener);
+    const list = this.lists.get(name) ?? new Set();
+    this.lists.set(name, list.add(listener));
     return () => void list.delete(listener);
   }
 

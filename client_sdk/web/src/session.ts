@@ -101,15 +101,6 @@ export class Session {
 
   // ---- Calls of the user.
 
-  /** Returns the server time; NaN if it is not known yet. */
-  serverTimeS(nowS: number): number {
-    return native().call.server_time(this.client, nowS);
-  }
-  /** Returns the server time to display; NaN if it is not known yet. */
-  renderTimeS(nowS: number): number {
-    return native().call.render_time(this.client, nowS);
-  }
-
   /** Starts to connect. Does nothing if already open. `addressIndex` is an index in `urls`. */
   open(nowS: number, urls: readonly string[] = ['']): void {
     if (this.isOpen()) return;

@@ -4,12 +4,12 @@ import {CrowdReader} from './pose_buffers';
 import {WorldRecording} from './recording';
 import type {Session} from './session';
 import {
-  PoseFlag, type AvatarState, type CrowdPose, type LayerRequest, type MovementRequest,
-  type Observation, type Pose, type PoseKind, type Recording, type Reply, type Role, type Skeleton,
-  type SpawnItem, type Subscription, type Terrain, type World, type WorldListeners, type WorldState
+  PoseFlag, type CrowdPose, type Pose, type PoseKind, type Recording, type Reply, type Role,
+  type Skeleton, type Terrain, type World, type WorldListeners, type WorldState
 } from './types';
 import type {WorldInfo} from '../generated/messages';
 import * as commands from './wire/commands';
+import type {Draft} from './wire/frame';
 
 /** A subscription that the client restores after lost sessions. */
 export interface ActiveSubscription {
@@ -62,49 +62,22 @@ export class WorldHandle implements World {
     return this.record;
   }
 
-  spawn(items: readonly SpawnItem[]): Promise<Reply> {
-    return this.session.command(this, () => ({type: 'Spawn', items}));
-  }
+  spawn: World['spawn'] = (items) => this.send({type: 'Spawn', items});
+  remove: World['remove'] = (avatars) => this.send({type: 'Remove', avatars});
+  cancel: World['cancel'] = (avatars) => this.send({type: 'CancelQueue', avatars});
+  request: World['request'] = (items) => this.session.command(
+      this, () => commands.request(items, () => this.session.nextRequestId++));
+  setTerrain: World['setTerrain'] = (terrain) => this.send({type: 'SetTerrain', terrain});
+  setLayers: World['setLayers'] = (items) => this.send({type: 'SetLayers', items});
+  setPlanting: World['setPlanting'] = (avatars, enabled) =>
+      this.send({type: 'SetPlanting', avatars, enabled});
+  observe: World['observe'] = (observation) => this.session.observe(this, observation);
+  inspect: World['inspect'] = (avatar) => this.session.inspect(this, avatar);
+  leave: World['leave'] = () => this.session.leave(this);
+  on: World['on'] = (name, listener) => this.listeners.on(name, listener);
 
-  remove(avatars: readonly number[]): Promise<Reply> {
-    return this.session.command(this, () => ({type: 'Remove', avatars}));
-  }
-
-  cancel(avatars: readonly number[]): Promise<Reply> {
-    return this.session.command(this, () => ({type: 'CancelQueue', avatars}));
-  }
-
-  request(items: readonly MovementRequest[]): Promise<Reply> {
-    return this.session.command(
-        this, () => commands.request(items, () => this.session.nextRequestId++));
-  }
-
-  setTerrain(terrain: Terrain | null): Promise<Reply> {
-    return this.session.command(this, () => ({type: 'SetTerrain', terrain}));
-  }
-
-  setLayers(items: readonly LayerRequest[]): Promise<Reply> {
-    return this.session.command(this, () => ({type: 'SetLayers', items}));
-  }
-
-  setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply> {
-    return this.session.command(this, () => ({type: 'SetPlanting', avatars, enabled}));
-  }
-
-  observe(observation: Observation): Subscription {
-    return this.session.observe(this, observation);
-  }
-
-  inspect(avatar: number): Promise<AvatarState> {
-    return this.session.inspect(this, avatar);
-  }
-
-  leave(): Promise<Reply> {
-    return this.session.leave(this);
-  }
-
-  on<K extends keyof WorldListeners>(name: K, listener: WorldListeners[K]): () => void {
-    return this.listeners.on(name, listener);
+  private send(message: Draft): Promise<Reply> {
+    return this.session.command(this, () => message);
   }
 
   avatars(): Uint32Array {
