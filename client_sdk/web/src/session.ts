@@ -26,20 +26,14 @@ const cacheTimeoutS = 5;
 /** States of the module, in the order of their numbers. */
 const states: readonly ClientState[] =
     ['idle', 'waiting', 'connecting', 'handshake', 'ready', 'closing', 'closed'];
-/** Messages that contain something which the module does not process. */
+const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
+/** Messages with contents that the module leaves to this class. */
 const userMessages: readonly number[] =
     [MessageType.WorldInfo, MessageType.Events, MessageType.AvatarState];
-const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
-
 /** Results of `state`. */
 const networkNames = [
   'nextTimeS', 'connectDue', 'needsSocket', 'connectionNumber', 'outputBytes', 'addressIndex',
 ] as const;
-
-interface Pending {
-  readonly world: WorldHandle;
-  readonly answer: (reply: Reply) => void;
-}
 
 interface Inspection {
   readonly resolve: (state: AvatarState) => void;
@@ -71,7 +65,8 @@ export class Session {
   private nextSubscription = 1;
   /** The next id for a request without an id. */
   nextRequestId = 1n;
-  private readonly pending = new Map<number, Pending>();
+  /** Functions to call with the replies to commands, by the number of the command. */
+  private readonly pending = new Map<number, (reply: Reply) => void>();
   private readonly inspections = new Map<bigint, Inspection>();
   private lastEventsNumber = 0n;
   private connection = 0;
@@ -226,9 +221,8 @@ export class Session {
   inspect(world: WorldHandle, avatar: number): Promise<AvatarState> {
     return new Promise((resolve, reject) => this.run(() => {
       try {
-        const {code, text} = this.call(world, {type: 'InspectAvatar', nonce: 0n, avatar});
-        if (code !== 0) throw new StridewireError(code, text);
-        this.inspections.set(BigInt(native().results[0]!),
+        const results = this.call(world, {type: 'InspectAvatar', nonce: 0n, avatar});
+        this.inspections.set(BigInt(results[0]!),
                              {resolve, reject, deadlineS: this.nowS + inspectTimeoutS});
       } catch (error) {
         const {code, text} = refusal(error);
@@ -350,12 +344,13 @@ export class Session {
     return ['waiting', 'connecting', 'handshake', 'ready'].includes(this.state);
   }
 
-  /** Sends a message to the module. The numbers that it returns are in `native().results`. */
-  private call(world: WorldHandle, message: Draft): {code: number, text: string} {
-    const frame = writeMessage(message);
-    native().setInput(frame);
-    const code = native().call.command(this.client, world.handle, frame.length);
-    return {code, text: code === 0 ? '' : webNames(native().text)};
+  /** Sends a message to the module and returns the results.
+   * @throws StridewireError the module refuses the command */
+  private call(world: WorldHandle, message: Draft): Float64Array {
+    const bytes = native().setInput(writeMessage(message));
+    const code = native().call.command(this.client, world.handle, bytes);
+    if (code !== 0) throw new StridewireError(code, webNames(native().text));
+    return native().results;
   }
 
   /** Sends a command and returns the number of its subscription.
@@ -368,20 +363,21 @@ export class Session {
       checkMessage(message);
       throw new StridewireError(joins ? Status.closed : Status.not_joined, '');
     }
-    const {code, text} = this.call(world, message);
-    if (code !== 0) throw new StridewireError(code, text);
-    const {results} = native();
-    this.pending.set(results[0]!, {world, answer});
+    const results = this.call(world, message);
+    this.pending.set(results[0]!, answer);
     return results[1]!;
   }
 
   /** Joins a world in the module and starts its subscriptions. */
   private attach(world: WorldHandle): void {
-    const {code, text} = this.call(world, {type: 'JoinWorld', name: world.name, role: world.role});
-    if (code !== 0) return this.refuse(world, makeReply(code, text));
-    const {results} = native();
-    world.handle = results[1]!;
-    this.pending.set(results[0]!, {world, answer: (reply) => this.answerJoin(world, reply)});
+    try {
+      const {name, role} = world;
+      const results = this.call(world, {type: 'JoinWorld', name, role});
+      world.handle = results[1]!;
+      this.pending.set(results[0]!, (reply) => this.answerJoin(world, reply));
+    } catch (error) {
+      return this.refuse(world, refusal(error));
+    }
     for (const [id, active] of world.subscriptions) {
       const {answer} = active;
       try {
@@ -516,10 +512,10 @@ export class Session {
           // A frame can cause replies to several commands, but describes only one of them.
           const reply = frame !== undefined && command === this.answered
               ? read() as ReplyMessage : undefined;
-          const pending = this.pending.get(command);
+          const answer = this.pending.get(command);
           this.pending.delete(command);
           const result = makeReply(status, reply?.text ?? webNames(text), reply);
-          if (pending !== undefined) this.later(() => pending.answer(result));
+          this.later(() => answer?.(result));
           break;
         }
         case NativeEvent.item:
@@ -682,8 +678,6 @@ const finalizers = new FinalizationRegistry<number>((client) => native().call.de
 
 /** @throws Malformed the message is invalid */
 function checkMessage(message: Draft): void {
-  const frame = writeMessage(message);
-  native().setInput(frame);
-  if (native().call.check_frame(frame.length, 1) !== 0) return;
-  throw new Malformed(webNames(native().text));
+  const bytes = native().setInput(writeMessage(message));
+  if (native().call.check_frame(bytes, 1) === 0) throw new Malformed(webNames(native().text));
 }

@@ -15,8 +15,8 @@ function senderOf(type: number): Sender {
 }
 
 function check(frame: Uint8Array, sender: Sender): void {
-  native().setInput(frame);
-  if (native().call.check_frame(frame.length, Number(sender === 'client')) === 0) {
+  const bytes = native().setInput(frame);
+  if (native().call.check_frame(bytes, Number(sender === 'client')) === 0) {
     throw new Error(native().text);
   }
 }
@@ -37,10 +37,9 @@ export function decodeMessage(frame: ArrayBuffer, sender = senderOf(typeOfFrame(
  * @throws Error the message does not follow protocol/STANDARD.md
  */
 export function encodeMessage(message: Message): ArrayBuffer {
-  const frame = writeMessage({...message});
-  native().setInput(frame);
   const isClient = senderOf(MessageType[message.type]) === 'client';
-  const bytes = native().call.encode_frame(frame.length, Number(isClient));
+  const bytes = native().call.encode_frame(
+      native().setInput(writeMessage({...message})), Number(isClient));
   if (bytes === 0) throw new Error(native().text);
   return native().bytes(native().results[0]!, bytes).buffer;
 }
