@@ -63,7 +63,8 @@ class TypeScriptCodec(TypeScript):
             array = f"w.{name}Array() ?? new {ARRAYS.get(f.type)}(0)"
             return f"Array.from({array}, (value) => enums.{enum}[value]!)" if enum else array
         if f.is_list:
-            entries = f"list(w.{name}Length(), (i) => read{f.type}(w.{name}(i)))"
+            entries = (f"Array.from({{length: w.{name}Length()}}, "
+                       f"(_, i) => read{f.type}(w.{name}(i)))")
             return f"Object.fromEntries({entries})" if self.is_parameters(f) else entries
         if f.type == "string":
             return f"text(w.{name}(Encoding.UTF8_BYTES))"
@@ -281,7 +282,7 @@ class TypeScriptCodec(TypeScript):
                 "import type {ParameterName} from '../src/types';\n"
                 "import * as check from '../src/wire/check';\n"
                 "import {parameterList, parameterNames} from '../src/wire/parameters';\n"
-                "import {absent, list, structs, text, zeros} from '../src/wire/support';\n"
+                "import {absent, structs, text, zeros} from '../src/wire/support';\n"
                 f"import {{enums, type {names.replace(', ', ', type ')}}} from './messages';\n"
                 "import * as wire from './wire';\n\n" + "\n".join(filter(None, functions)) +
                 "\n/** Read the message that begins at the position of `bytes`. */\n"

@@ -14,7 +14,6 @@ import {
 import {NativeEvent, readStatistics} from '../generated/native';
 import * as commands from './wire/commands';
 import {avatarStateOf, eventOf} from './wire/convert';
-import {Malformed} from './wire/check';
 import {
   frameHeaderBytes, readMessage, typeOfFrame, writeMessage, type Draft
 } from './wire/frame';
@@ -676,8 +675,8 @@ export class Session {
 /** Frees the memory of clients that are no longer used. */
 const finalizers = new FinalizationRegistry<number>((client) => native().call.destroy(client));
 
-/** @throws Malformed the message is invalid */
+/** @throws Error the message is invalid */
 function checkMessage(message: Draft): void {
   const bytes = native().setInput(writeMessage(message));
-  if (native().call.check_frame(bytes, 1) === 0) throw new Malformed(webNames(native().text));
+  if (native().call.check_frame(bytes, 1) === 0) throw new Error(webNames(native().text));
 }

@@ -288,7 +288,8 @@ class TypeScriptTest(unittest.TestCase):
     def test_reads_and_builds_tables(self):
         codec = self.web.codec()
         for line in ("  color: enums.Color[w.color()]!,", "  visible: !w.hidden(),",
-                     "  items: list(w.itemsLength(), (i) => readItem(w.items(i))),",
+                     "  items: Array.from({length: w.itemsLength()}, "
+                     "(_, i) => readItem(w.items(i))),",
                      "  speedMS: w.speedMS(),", "  place: readPoint(w.place()),",
                      "  const {seq, color, text, items, visible = true, place} = "
                      "check.object(fields, at);",

@@ -1,7 +1,5 @@
-/** Functions that the generated code calls to check values that the user has passed. */
-
-/** Thrown if a message cannot be sent. It does not leave the package. */
-export class Malformed extends Error {}
+/** Functions that the generated code calls to check values that the user has passed. They throw an
+ * Error with the path of the value. */
 
 export type Fields = {readonly [name: string]: unknown};
 
@@ -18,7 +16,7 @@ export class Place {
   }
 
   fail(what: string): never {
-    throw new Malformed(`${this.path}${this.index < 0 ? '' : `[${this.index}]`}: ${what}`);
+    throw new Error(`${this.path}${this.index < 0 ? '' : `[${this.index}]`}: ${what}`);
   }
 }
 

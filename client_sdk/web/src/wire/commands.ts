@@ -30,15 +30,8 @@ export type ObserveDraft = Draft & {
 
 export function observe(observation: Observation): ObserveDraft {
   check.object(observation, new check.Place('observation'));
-  const {detail = 'all', withEvents} = observation;
-  return {
-    ...observation,
-    type: 'Observe',
-    withEvents: withEvents === true,
-    region: observation.region === undefined ? null : region(observation.region, detail),
-    replace: false,
-    detail,
-  };
+  const {detail = 'all', region: asked} = observation;
+  return {...observation, type: 'Observe', detail, region: asked ? region(asked, detail) : null};
 }
 
 /** `beyond` is the detail of the observation, which applies beyond the rings of the region. */

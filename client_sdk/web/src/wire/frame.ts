@@ -30,7 +30,7 @@ export function readMessage(frame: ArrayBuffer): Message {
  * Writes a message as a frame. Properties may be absent if the schema states a default. Absent
  * `seq`, `world` and `subscription` are written as 1, because the WebAssembly module sets them in
  * commands.
- * @throws Malformed a value has the wrong type, or does not fit into the type of its field. The
+ * @throws Error a value has the wrong type, or does not fit into the type of its field. The
  *     WebAssembly module checks everything else.
  */
 export function writeMessage(message: Draft): Uint8Array<ArrayBuffer> {

@@ -13,10 +13,6 @@ export function text(bytes: string | Uint8Array | null): string {
   return bytes === null ? '' : decoder.decode(bytes as Uint8Array);
 }
 
-export function list<T>(length: number, read: (i: number) => T): T[] {
-  return Array.from({length}, (_, i) => read(i));
-}
-
 /** Builds a list of structs. Builders write backwards. */
 export function structs<T>(b: Builder, values: readonly T[],
                            start: (b: Builder, count: number) => void,
