@@ -17,7 +17,7 @@ import {avatarStateOf, eventOf} from './wire/convert';
 import {
   frameHeaderBytes, readMessage, typeOfFrame, writeMessage, type Draft
 } from './wire/frame';
-import {WorldHandle} from './world';
+import {WorldHandle, type ActiveSubscription} from './world';
 
 const inspectTimeoutS = 10;
 const cacheTimeoutS = 5;
@@ -154,18 +154,11 @@ export class Session {
   observe(world: WorldHandle, observation: Observation): Subscription {
     const id = this.nextSubscription++;
     const reply = this.attempt((resolve) => {
-      const message = commands.observe(observation);
-      // A new subscription takes effect when the client connects.
-      if (world.handle === 0 && world.state === 'pending') {
-        checkMessage(message);
-        world.subscriptions.set(id, {message, handle: 0, answer: resolve});
-        return;
-      }
-      const handle = this.submit(world, message, (result) => {
-        if (!result.ok && result.code !== Status.cancelled) world.subscriptions.delete(id);
-        resolve(result);
-      });
-      world.subscriptions.set(id, {message, handle, answer: null});
+      const active = {message: commands.observe(observation), handle: 0, answer: resolve};
+      const waits = world.handle === 0 && world.state === 'pending';
+      if (waits) checkMessage(active.message);  // It is sent when the client connects.
+      world.subscriptions.set(id, active);
+      if (!waits) this.start(world, id, active);
     });
     return {
       id,
@@ -377,19 +370,22 @@ export class Session {
     } catch (error) {
       return this.refuse(world, refusal(error));
     }
-    for (const [id, active] of world.subscriptions) {
-      const {answer} = active;
-      try {
-        active.answer = null;
-        active.handle = this.submit(world, active.message, (reply) => {
-          if (!reply.ok && reply.code !== Status.cancelled) world.subscriptions.delete(id);
-          if (answer !== null) answer(reply);
-          else if (!reply.ok) this.notice(reply.code, reply.text);
-        });
-      } catch (error) {
-        world.subscriptions.delete(id);
-        answer?.(refusal(error));
-      }
+    for (const [id, active] of world.subscriptions) this.start(world, id, active);
+  }
+
+  /** Starts a subscription in the module. */
+  private start(world: WorldHandle, id: number, active: ActiveSubscription): void {
+    const {answer} = active;
+    active.answer = null;
+    try {
+      active.handle = this.submit(world, active.message, (reply) => {
+        if (!reply.ok && reply.code !== Status.cancelled) world.subscriptions.delete(id);
+        if (answer !== null) answer(reply);
+        else if (!reply.ok) this.notice(reply.code, reply.text);
+      });
+    } catch (error) {
+      world.subscriptions.delete(id);
+      answer?.(refusal(error));
     }
   }
 

@@ -44,6 +44,8 @@ export class WorldHandle implements World {
   reportedDroppedEvents = 0;
   /** Revision of the avatars in the last notification to listeners. */
   revision = 0;
+  /** The message of the skeleton as JSON, to detect changes. */
+  private skeletonText = '';
   private list = new Uint32Array(0);
   private listRevision = 0;
   private listHandle = 0;
@@ -131,10 +133,11 @@ export class WorldHandle implements World {
 
   /** Applies a WorldInfo message. */
   setInfo(info: WorldInfo): void {
-    const skeleton = toSkeleton(info);
-    if (this.skeleton === null || !sameSkeleton(this.skeleton, skeleton)) {
+    const text = JSON.stringify(info.skeleton);
+    if (this.skeleton === null || text !== this.skeletonText) {
       this.record.clearEvents();
-      this.skeleton = skeleton;
+      this.skeleton = toSkeleton(info);
+      this.skeletonText = text;
     }
     this.libraryHash = info.libraryHash;
     this.layers = info.layers;
@@ -164,10 +167,4 @@ function toSkeleton({skeleton}: WorldInfo): Skeleton {
     leftLeg,
     rightLeg,
   };
-}
-
-function sameSkeleton(a: Skeleton, b: Skeleton): boolean {
-  const serialise = (s: Skeleton): string =>
-      JSON.stringify([s.names, [...s.parents], [...s.offsetsM], s.endSites, s.leftLeg, s.rightLeg]);
-  return serialise(a) === serialise(b);
 }
