@@ -73,15 +73,17 @@ class TypeScript:
             return f"readonly ({name})[]" if " " in name else f"readonly {name}[]"
         return name + (" | null" if "optional" in f or f.default == "null" else "")
 
-    def words(self, lines):
-        """The text of a comment, with the names of TypeScript, and the values of limits."""
+    def words(self, lines, table=None):
+        """The text of a comment, with the names of TypeScript, and the values of limits. `table` is
+        the table whose fields the comment may mention."""
+        names = {f.name: self.name_of(f) for f in table.fields} if table else {}
         text = re.sub(r"\bkMax(\w+)", lambda m: self.limit(m[1]) or m[0], " ".join(lines))
-        text = re.sub(r"`(\w+)`", lambda m: f"`{lower_camel(m[1])}`", text)
+        text = re.sub(r"`(\w+)`", lambda m: f"`{names.get(m[1]) or lower_camel(m[1])}`", text)
         text = re.sub(r"\b(?:\w+::)?k([A-Z]\w+)", lambda m: f"`{self.value_name(m[1])}`", text)
         return text.replace("::", ".")
 
-    def comment(self, lines, indent=""):
-        lines = textwrap.wrap(self.words(lines), 94 - len(indent))
+    def comment(self, lines, indent="", table=None):
+        lines = textwrap.wrap(self.words(lines, table), 94 - len(indent))
         return f"{indent}/** {f'{chr(10)}{indent} * '.join(lines)} */\n" if lines else ""
 
     def value_name(self, name):
@@ -102,10 +104,10 @@ class TypeScript:
         for name, fields in self.properties(table).items():
             types = [self.type_of(f) for f in fields]
             type_name = types[0] if len(types) == 1 else f"readonly [{', '.join(types)}]"
-            members += (f"{self.comment(self.schema.documentation(fields[0]), '  ')}"
+            members += (f"{self.comment(self.schema.documentation(fields[0]), '  ', table)}"
                         f"  readonly {name}: {type_name};\n")
-        return (f"{self.comment(table.doc)}export interface {self.interface_name(table)} "
-                f"{{\n{tag}{members}}}\n")
+        comment = self.comment(table.doc, table=table)
+        return f"{comment}export interface {self.interface_name(table)} {{\n{tag}{members}}}\n"
 
     def enum_type(self, enum):
         """The type of an enum. The comment lists the values that have comments."""

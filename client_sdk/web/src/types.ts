@@ -134,11 +134,7 @@ export interface CurrentMovement extends Omit<messages.CurrentMovement, 'paramet
 }
 
 /** Rate and detail of poses within a distance from the centre of a region. */
-export interface RegionRing {
-  /** Distance from the centre up to which the ring applies. It must increase from ring to ring. */
-  outerRadiusM: number;
-  /** The server sends one pose per this many ticks, 1 to 3600. */
-  everyNTicks: number;
+export interface RegionRing extends messages.RateRing {
   /** Detail of the poses. Absent: the detail of the observation. Requires mode `quantised`. */
   detail?: PoseDetail;
 }

@@ -316,6 +316,11 @@ class TypeScriptTest(unittest.TestCase):
             self.assertIn(line, web.codec())
         self.assertIn("  json.min_z = m.minM[1];", web.json())
 
+    def test_comments_have_the_names_of_properties(self):
+        messages = TypeScriptCodec(read("""/// At most `far_m` away.
+        table Ring { far_m: double (web: "radiusM"); }""")).messages()
+        self.assertIn("/** At most `radiusM` away. */\nexport interface Ring", messages)
+
 
 class StandardTest(unittest.TestCase):
     """STANDARD.md agrees with the schema."""
