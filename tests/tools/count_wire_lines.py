@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Counts the hand-written lines that describe the messages of the wire protocol.
+"""Counts the hand-written lines that describe the messages of the wire protocol, and the lines of
+code of the web client.
 
     tests/tools/count_wire_lines.py            # prints the lines of each file and their sum
 
@@ -8,7 +9,10 @@ that such code calls: the schema, message structs, encoders, decoders, checks, J
 the test vectors, in C++ and TypeScript. All its lines count, with comments and empty lines.
 Generated files and the generator do not count. The codecs of poses, framing and the public types of
 the client libraries do not count either.
+
+Lines of code are those with more than a comment.
 """
+import re
 import sys
 from pathlib import Path
 
@@ -27,6 +31,11 @@ PATTERNS = {
 }
 
 
+def lines_of_code(path):
+    code = re.sub(r"/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.S)
+    return sum(bool(re.sub(r"^\s*//.*", "", line).strip()) for line in code.splitlines())
+
+
 def main():
     total = 0
     for part, patterns in PATTERNS.items():
@@ -39,6 +48,8 @@ def main():
             total += lines
             print(f"{lines:7}  {path.relative_to(ROOT)}")
     print(f"{total:7}  in total")
+    code = sum(lines_of_code(path) for path in (ROOT / "client_sdk/web/src").rglob("*.ts"))
+    print(f"{code:7}  lines of code in client_sdk/web/src")
 
 
 if __name__ == "__main__":
