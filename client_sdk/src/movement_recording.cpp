@@ -10,6 +10,7 @@ namespace stridewire::client {
 
 void MovementRecording::Add(protocol::AvatarId avatar, const PoseStamp& stamp,
                             const AvatarReplica& replica,
+                            const std::shared_ptr<const PlayedMovement>& movement,
                             const std::shared_ptr<const MotionLibrary>& library, double tick_s,
                             Cursor& cursor) {
   if (library_ != library) {
@@ -25,19 +26,18 @@ void MovementRecording::Add(protocol::AvatarId avatar, const PoseStamp& stamp,
           kMaxDifferenceS) {
     return;
   }
-  STRIDEWIRE_CHECK(replica.movement() != nullptr);
-  auto movement = std::make_unique<Movement>(*replica.movement());
-  if (!movement->is_inertial) movement->difference_velocity = {};
-  const std::size_t bytes = sizeof(Span) + sizeof(Movement) +
-                            movement->weights.size() * sizeof(float) +
-                            movement->difference.rotations.size() * sizeof(Quat) +
-                            movement->difference_velocity.joints_rad_s.size() * sizeof(Vec3);
+  STRIDEWIRE_CHECK(movement != nullptr && movement->number == replica.movement_number());
+  const Movement& of = movement->movement;
+  const std::size_t bytes = sizeof(Span) + sizeof(PlayedMovement) +
+                            of.weights.size() * sizeof(float) +
+                            of.difference.rotations.size() * sizeof(Quat) +
+                            of.difference_velocity.joints_rad_s.size() * sizeof(Vec3);
   spans_.push_back({.avatar = avatar,
                     .flags = CrowdFlagsOf(stamp),
                     .begin_tick = stamp.tick,
                     .begin_s = replica.movement_time_s(),
                     .tick_s = tick_s,
-                    .movement = std::move(movement),
+                    .movement = movement,
                     .bytes = bytes});
   bytes_ += bytes;
   cursor = {.recording = number_,
@@ -62,28 +62,21 @@ std::size_t MovementRecording::Evaluate(std::uint64_t tick,
     const Span*& found = found_[static_cast<std::size_t>(place - avatars.begin())];
     if (found == nullptr) found = &*span;
   }
-  if (!evaluator_) evaluator_.emplace(*library_, 1);
+  if (!evaluator_) evaluator_.emplace(library_);
   std::size_t count = 0;
   for (const Span* span : found_) {
     if (span == nullptr) continue;
     const std::uint64_t ticks = tick - span->begin_tick;
     const double time_s = span->begin_s + static_cast<double>(ticks) * span->tick_s;
     const std::size_t index = at + count++;
-    batcher_.Add({.movement = span->movement.get(), .time_s = time_s, .step_s = span->tick_s}, 1,
-                 static_cast<std::uint32_t>(index));
+    evaluator_->Add(span->movement->movement, time_s, out.roots_m[index],
+                    std::span(out.rotations).subspan(index * out.joint_count, out.joint_count));
     out.avatars[index] = span->avatar;
     // Only the first pose may be a discontinuity.
     out.flags[index] =
         ticks == 0 ? span->flags : static_cast<std::uint8_t>(span->flags & ~kCrowdDiscontinuity);
   }
-  batcher_.Evaluate(*evaluator_, [&out](std::span<const EvaluationBatcher::Item> items, int,
-                                        const SoaPose& poses) {
-    for (std::size_t lane = 0; lane < items.size(); ++lane) {
-      const std::size_t index = items[lane].tag;
-      poses.Get(lane, {out.roots_m[index],
-                       std::span(out.rotations).subspan(index * out.joint_count, out.joint_count)});
-    }
-  });
+  evaluator_->Evaluate();
   return count;
 }
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "crowd_pose.h"
+#include "movement_evaluator.h"
 #include "runtime/avatar/avatar_replica.h"
-#include "runtime/pose/evaluation_batcher.h"
 
 namespace stridewire::client {
 
@@ -28,10 +28,11 @@ class MovementRecording {
     double begin_s = 0.0;  ///< Time of the movement at `begin_tick`.
   };
 
-  /// Records the pose of an avatar that has a movement and no layers. Stores a copy of the movement
-  /// unless the pose continues the movement of `cursor`. `tick_s` is the length of a tick. Ticks
-  /// must not decrease, except for small differences between shards.
+  /// Records the pose of an avatar that has a movement and no layers. `movement` is the movement of
+  /// `replica`. Stores it unless the pose continues the movement of `cursor`. `tick_s` is the
+  /// length of a tick. Ticks must not decrease, except for small differences between shards.
   void Add(protocol::AvatarId avatar, const PoseStamp& stamp, const AvatarReplica& replica,
+           const std::shared_ptr<const PlayedMovement>& movement,
            const std::shared_ptr<const MotionLibrary>& library, double tick_s, Cursor& cursor);
 
   /// Evaluates the poses of these avatars in a tick and writes them to `out` from index `at` on.
@@ -58,13 +59,12 @@ class MovementRecording {
     std::uint64_t begin_tick = 0;
     double begin_s = 0.0;
     double tick_s = 0.0;
-    std::unique_ptr<const Movement> movement;
+    std::shared_ptr<const PlayedMovement> movement;
     std::size_t bytes = 0;
   };
 
   std::shared_ptr<const MotionLibrary> library_;
-  std::optional<SoaPoseEvaluator> evaluator_;  // Has a value after the first evaluation.
-  EvaluationBatcher batcher_;
+  std::optional<MovementEvaluator> evaluator_;  // Has a value after the first evaluation.
   // In ascending order of begin_tick, except for small differences between shards.
   std::deque<Span> spans_;
   std::uint64_t number_ = 1;  // Clear increases it, which invalidates all cursors.

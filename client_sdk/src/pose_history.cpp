@@ -22,11 +22,10 @@ std::size_t PoseHistory::Bytes(std::size_t capacity, std::size_t joint_count) {
          capacity * (sizeof(Entry) + joint_count * sizeof(Quat));
 }
 
-bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
-                       std::span<const Quat> rotations) {
+std::optional<std::size_t> PoseHistory::PushStamp(const PoseStamp& stamp) {
   if (size_ > 0) {
     const PoseStamp& newest = this->stamp(size_ - 1);
-    if (stamp.tick <= newest.tick || stamp.time_s <= newest.time_s) return false;
+    if (stamp.tick <= newest.tick || stamp.time_s <= newest.time_s) return std::nullopt;
     if (stamp.discontinuity || IsInterrupted()) {
       correction_.state = Correction::State::kNone;
       if (displayed_s_ < this->stamp(0).time_s) displayed_s_ = kNever;
@@ -44,16 +43,82 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
     const bool has_begun = size_ > 1 && displayed_s_ > this->stamp(size_ - 2).time_s;
     entries_[Slot(size_ - 1)].slope_is_before = has_begun;
   }
-  if (size_ == entries_.size()) {
-    first_ = (first_ + 1) % entries_.size();
-    --size_;
-  }
-  STRIDEWIRE_CHECK(size_ < entries_.size() && rotations.size() == joint_count_);
+  if (size_ == entries_.size()) DropOldest();
+  STRIDEWIRE_CHECK(size_ < entries_.size());
   const std::size_t slot = Slot(size_++);
-  entries_[slot] = {.stamp = stamp, .root_position_m = root_position_m};
-  std::ranges::copy(rotations,
-                    rotations_.begin() + static_cast<std::ptrdiff_t>(slot * joint_count_));
+  entries_[slot] = {.stamp = stamp};
+  return slot;
+}
+
+bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
+                       std::span<const Quat> rotations) {
+  const auto slot = PushStamp(stamp);
+  if (!slot) return false;
+  STRIDEWIRE_CHECK(rotations.size() == joint_count_);
+  entries_[*slot].root_position_m = root_position_m;
+  std::ranges::copy(rotations, RotationsAt(*slot).begin());
   return true;
+}
+
+bool PoseHistory::Push(const PoseStamp& stamp,
+                       const std::shared_ptr<const PlayedMovement>& movement, double time_s,
+                       MovementEvaluator& evaluator) {
+  STRIDEWIRE_CHECK(movement != nullptr && (evaluator_ == nullptr || evaluator_ == &evaluator));
+  const auto slot = PushStamp(stamp);
+  if (!slot) return false;
+  evaluator_ = &evaluator;
+  if (movements_.empty() || movements_.back() != movement) AddMovement(movement);
+  entries_[*slot].movement = movement.get();
+  entries_[*slot].movement_time_s = time_s;
+  return true;
+}
+
+void PoseHistory::DropOldest() {
+  first_ = (first_ + 1) % entries_.size();
+  --size_;
+}
+
+// Adds the movement of the newest pose, and removes movements that no pose needs any more.
+void PoseHistory::AddMovement(const std::shared_ptr<const PlayedMovement>& movement) {
+  // If movements are interrupted very often, the oldest poses are dropped to limit memory.
+  const std::size_t most = 4 + entries_.size() / 4;
+  const auto oldest = [this] {
+    std::size_t i = 0;
+    while (i + 1 < size_ && entries_[Slot(i)].movement == nullptr) ++i;
+    return std::ranges::find(movements_, entries_[Slot(i)].movement,
+                             [](const auto& kept) { return kept.get(); });
+  };
+  movements_.erase(movements_.begin(), oldest());
+  while (movements_.size() >= most) {
+    DropOldest();
+    movements_.erase(movements_.begin(), oldest());
+  }
+  movements_.push_back(movement);
+}
+
+PoseHistory::MovementTime PoseHistory::NewestMovement() const {
+  if (size_ == 0) return {};
+  const Entry& newest = entries_[Slot(size_ - 1)];
+  return {newest.movement, newest.movement_time_s};
+}
+
+void PoseHistory::EvaluateAll() {
+  for (std::size_t i = 0; i < size_; ++i) PreparePose(i);
+  if (evaluator_ != nullptr) evaluator_->Evaluate();
+  for (Entry& entry : entries_) entry.movement = nullptr;
+  movements_.clear();
+  evaluator_ = nullptr;
+}
+
+ConstPoseSpan PoseHistory::pose(std::size_t i) const {
+  const std::size_t slot = Slot(i);
+  Entry& entry = entries_[slot];
+  if (entry.movement != nullptr && !entry.is_evaluated) {
+    EvaluateMovement({entry.movement, entry.movement_time_s}, entry.root_position_m,
+                     RotationsAt(slot));
+    entry.is_evaluated = true;
+  }
+  return {entry.root_position_m, RotationsAt(slot)};
 }
 
 // Returns the first pose after a time. Poses are usually sampled shortly before the newest one and
@@ -98,7 +163,8 @@ void PoseHistory::Prefetch(double time_s, bool is_near) const {
   const std::size_t begin = after >= 2 ? after - 2 : 0;
   const std::size_t end = std::min(after + 2, size_);
   for (std::size_t i = begin; i < end; ++i) {
-    PrefetchBytes(rotations(i).data(), rotations(i).size_bytes());
+    if (entries_[Slot(i)].movement != nullptr) continue;
+    PrefetchBytes(RotationsAt(Slot(i)).data(), joint_count_ * sizeof(Quat));
   }
 }
 
@@ -107,6 +173,7 @@ void PoseHistory::PrefetchPush() const {
   const std::size_t slot = Slot(size_ == entries_.size() ? 0 : size_);
   PrefetchBytes(&entries_[Slot(size_ - 1)], sizeof(Entry));
   PrefetchBytes(&entries_[slot], sizeof(Entry));
+  if (evaluator_ != nullptr) return;  // The next pose is probably not stored.
   PrefetchBytes(&rotations_[slot * joint_count_], joint_count_ * sizeof(Quat));
 }
 
@@ -200,12 +267,11 @@ void PoseHistory::Extrapolate(std::size_t j, double time_s, Vec3& root_position_
 
 void PoseHistory::ResolveCorrection() {
   if (correction_.state != Correction::State::kPending) return;
-  Vec3 root_m;
   correction_.state = Correction::State::kNone;
-  const auto sampled = SampleCurve(correction_.start_s, root_m, displayed_);
+  const auto sampled = SampleCurve(correction_.start_s, correction_.curve_root_m, displayed_);
   if (!sampled) return;
   correction_.state = Correction::State::kActive;
-  correction_.root_m -= root_m;
+  correction_.root_m -= correction_.curve_root_m;
   for (std::size_t joint = 0; joint < joint_count_; ++joint) {
     correction_.rotations[joint] =
         Normalise(correction_.rotations[joint] * glm::conjugate(displayed_[joint]));
@@ -217,7 +283,80 @@ std::optional<PoseHistory::Sampled> PoseHistory::Display(double time_s, Vec3& ro
   ResolveCorrection();
   const auto sampled = Sample(time_s, root_position_m, rotations);
   if (sampled) displayed_s_ = time_s;
+  prepared_count_ = 0;
   return sampled;
+}
+
+bool PoseHistory::Prepare(double time_s, Vec3& root_position_m, std::span<Quat> rotations) {
+  const Curve curve = FindCurve(time_s);
+  prepared_count_ = 0;
+  if (curve.kind == Curve::Kind::kNone) return false;
+  if (evaluator_ == nullptr) return true;
+  if (correction_.state == Correction::State::kPending) {
+    PrepareCurve(FindCurve(correction_.start_s), correction_.curve_root_m, displayed_);
+  }
+  PrepareCurve(curve, root_position_m, rotations);
+  return true;
+}
+
+void PoseHistory::PrepareCurve(const Curve& curve, Vec3& root_position_m,
+                               std::span<Quat> rotations) {
+  switch (curve.kind) {
+    case Curve::Kind::kNone: return;
+    case Curve::Kind::kPose: return PreparePose(curve.i);
+    case Curve::Kind::kInterpolated: {
+      const auto [before, beyond] = NeighboursOf(curve.i);
+      for (std::size_t i = before; i <= beyond; ++i) PreparePose(i);
+      return;
+    }
+    case Curve::Kind::kMovement:
+      evaluator_->Add(curve.movement.movement->movement, curve.movement.time_s, root_position_m,
+                      rotations);
+      prepared_[prepared_count_++] = {curve.movement, &root_position_m, rotations.data()};
+      return;
+    case Curve::Kind::kExtrapolated:
+      if (curve.i > 0) PreparePose(curve.i - 1);
+      return PreparePose(curve.i);
+  }
+}
+
+void PoseHistory::PreparePose(std::size_t i) {
+  Entry& entry = entries_[Slot(i)];
+  if (entry.movement == nullptr || entry.is_evaluated) return;
+  evaluator_->Add(entry.movement->movement, entry.movement_time_s, entry.root_position_m,
+                  RotationsAt(Slot(i)));
+  entry.is_evaluated = true;
+}
+
+void PoseHistory::EvaluateMovement(const MovementTime& at, Vec3& root_position_m,
+                                   std::span<Quat> rotations) const {
+  for (const Prepared& prepared : std::span(prepared_).first(prepared_count_)) {
+    if (prepared.rotations == rotations.data() && prepared.at.movement == at.movement &&
+        prepared.at.time_s == at.time_s) {
+      return;
+    }
+  }
+  evaluator_->Add(at.movement->movement, at.time_s, root_position_m, rotations);
+  evaluator_->Evaluate();
+}
+
+PoseHistory::MovementTime PoseHistory::MovementAt(std::size_t i, double time_s) const {
+  const Entry& start = entries_[Slot(i)];
+  const Entry& end = entries_[Slot(i + 1)];
+  if (start.movement == nullptr || end.movement == nullptr) return {};
+  if (start.movement == end.movement) {
+    const double share = (time_s - start.stamp.time_s) / (end.stamp.time_s - start.stamp.time_s);
+    return {start.movement,
+            start.movement_time_s + share * (end.movement_time_s - start.movement_time_s)};
+  }
+  if (end.movement->previous_end_s < 0.0 || end.movement->number != start.movement->number + 1) {
+    return {};
+  }
+  // The movement at the end of the interval began where the other one ended.
+  const double end_time_s = end.movement_time_s - (end.stamp.time_s - time_s);
+  if (end_time_s >= end.movement->movement.start_offset_s) return {end.movement, end_time_s};
+  return {start.movement, std::min(start.movement_time_s + (time_s - start.stamp.time_s),
+                                   end.movement->previous_end_s)};
 }
 
 std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& root_position_m,
@@ -239,46 +378,63 @@ std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& roo
   return sampled;
 }
 
-std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3& root_position_m,
-                                                             std::span<Quat> rotations) const {
+PoseHistory::Curve PoseHistory::FindCurve(double time_s) const {
   const std::size_t after = FirstAfterTime(time_s);
-  if (after == 0) return std::nullopt;
+  if (after == 0) return {};
   const std::size_t i = after - 1;
   const std::size_t j = after;
 
-  const bool exact = stamp(i).time_s == time_s;
+  const bool is_exact = stamp(i).time_s == time_s;
   // If a gap precedes the discontinuity, the connection was interrupted. The motion before the gap
   // is then extrapolated instead of ending at once.
   const double before_s = i > 0 ? stamp(i).time_s - stamp(i - 1).time_s : 0.0;
   const bool is_last =
       j == size_ || (stamp(j).discontinuity && stamp(j).time_s - stamp(i).time_s > 1.5 * before_s);
-  if (is_last && !exact) {
-    Extrapolate(i, time_s, root_position_m, rotations);
-    const bool moves = i > 0 && !stamp(i).discontinuity;
-    return Sampled{i, false, moves && time_s - stamp(i).time_s < kMaxExtrapolationS};
-  }
-  if (exact || stamp(j).discontinuity) {
-    root_position_m = this->root_position_m(i);
-    std::ranges::copy(this->rotations(i), rotations.begin());
-    return Sampled{i, exact};
-  }
+  if (is_last && !is_exact) return {Curve::Kind::kExtrapolated, i};
+  if (is_exact || stamp(j).discontinuity) return {Curve::Kind::kPose, i, is_exact};
+  const MovementTime movement = MovementAt(i, time_s);
+  if (movement.movement != nullptr) return {Curve::Kind::kMovement, i, false, movement};
+  return {Curve::Kind::kInterpolated, i};
+}
 
+std::pair<std::size_t, std::size_t> PoseHistory::NeighboursOf(std::size_t i) const {
   // If a neighbour is missing, i or j replaces it, which results in the secant of the interval.
+  const std::size_t j = i + 1;
   const std::size_t before = i > 0 && !stamp(i).discontinuity ? i - 1 : i;
   const bool has_beyond =
       j + 1 < size_ && !stamp(j + 1).discontinuity && !entries_[Slot(j)].slope_is_before;
-  const std::size_t beyond = has_beyond ? j + 1 : j;
-  const auto pose = [this](std::size_t k) {
-    return ConstPoseSpan{this->root_position_m(k), this->rotations(k)};
-  };
-  InterpolatePose(
-      {.times_s = {stamp(before).time_s, stamp(i).time_s, stamp(j).time_s, stamp(beyond).time_s},
-       .before = pose(before),
-       .start = pose(i),
-       .end = pose(j),
-       .beyond = pose(beyond),
-       .start_slope_is_before = entries_[Slot(i)].slope_is_before},
-      time_s, root_position_m, rotations);
+  return {before, has_beyond ? j + 1 : j};
+}
+
+std::optional<PoseHistory::Sampled> PoseHistory::SampleCurve(double time_s, Vec3& root_position_m,
+                                                             std::span<Quat> rotations) const {
+  const Curve curve = FindCurve(time_s);
+  const std::size_t i = curve.i;
+  switch (curve.kind) {
+    case Curve::Kind::kNone: return std::nullopt;
+    case Curve::Kind::kPose:
+      root_position_m = this->root_position_m(i);
+      std::ranges::copy(this->rotations(i), rotations.begin());
+      return Sampled{i, curve.is_exact};
+    case Curve::Kind::kExtrapolated: {
+      Extrapolate(i, time_s, root_position_m, rotations);
+      const bool moves = i > 0 && !stamp(i).discontinuity;
+      return Sampled{i, false, moves && time_s - stamp(i).time_s < kMaxExtrapolationS};
+    }
+    case Curve::Kind::kMovement:
+      EvaluateMovement(curve.movement, root_position_m, rotations);
+      return Sampled{i, true};
+    case Curve::Kind::kInterpolated: break;
+  }
+  const auto [before, beyond] = NeighboursOf(i);
+  InterpolatePose({.times_s = {stamp(before).time_s, stamp(i).time_s, stamp(i + 1).time_s,
+                               stamp(beyond).time_s},
+                   .before = pose(before),
+                   .start = pose(i),
+                   .end = pose(i + 1),
+                   .beyond = pose(beyond),
+                   .start_slope_is_before = entries_[Slot(i)].slope_is_before},
+                  time_s, root_position_m, rotations);
   return Sampled{i, true};
 }
 

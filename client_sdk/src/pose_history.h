@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "movement_evaluator.h"
 #include "pose_stamp.h"
 #include "stridewire/base/math.h"
 #include "stridewire/runtime/pose.h"
@@ -34,8 +36,12 @@ struct PoseKeys {
 void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
                      std::span<Quat> rotations);
 
-/// Jitter buffer: the last poses of one avatar, oldest first. Allocates only in its constructor. A
-/// full buffer drops its oldest pose.
+/// Jitter buffer: the last poses of one avatar, oldest first. A full buffer drops its oldest pose.
+///
+/// A pose is either stored, or it is determined by a movement and evaluated when it is first read.
+/// Between two poses that are determined by the same movement, or by successive ones, the displayed
+/// pose is that of the movement instead of an interpolated one. Only movements are allocated after
+/// the constructor. The history keeps a movement while it has poses of it.
 ///
 /// The displayed motion is continuous, no matter when poses arrive:
 /// - A curve through the poses is not changed after its display has begun. The slope at a pose is
@@ -53,22 +59,42 @@ class PoseHistory {
   /// `capacity` (in poses) and `joint_count` must be above 0.
   PoseHistory(std::size_t capacity, std::size_t joint_count);
 
-  /// Returns the memory of a history in bytes.
+  /// Returns the memory of a history in bytes, without movements.
   [[nodiscard]] static std::size_t Bytes(std::size_t capacity, std::size_t joint_count);
 
   /// Adds a pose. Returns false and does nothing unless its tick and its time exceed those of the
   /// newest pose.
   bool Push(const PoseStamp& stamp, const Vec3& root_position_m, std::span<const Quat> rotations);
 
+  /// Same for a pose that is evaluated when it is read. `time_s` is its time in the movement.
+  /// `evaluator` must exist until EvaluateAll has been called or the history is destroyed.
+  bool Push(const PoseStamp& stamp, const std::shared_ptr<const PlayedMovement>& movement,
+            double time_s, MovementEvaluator& evaluator);
+
+  /// The pose of a movement at some time.
+  struct MovementTime {
+    const PlayedMovement* movement = nullptr;  ///< Null: there is no movement.
+    double time_s = 0.0;
+  };
+  /// Returns the movement of the newest pose, unless the pose is stored or the history is empty.
+  [[nodiscard]] MovementTime NewestMovement() const;
+
+  /// Returns true if a late pose changes the motion that Display returns at `time_s` or later.
+  [[nodiscard]] bool IsCorrected(double time_s) const {
+    return correction_.state != Correction::State::kNone &&
+           time_s - correction_.start_s < kCorrectionS;
+  }
+  /// Call it if the caller has computed and displayed the pose at `time_s` itself.
+  void SetDisplayed(double time_s) { displayed_s_ = time_s; }
+
+  /// Evaluates all poses. The history then refers to no movement and no evaluator.
+  void EvaluateAll();
+
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] std::size_t joint_count() const { return joint_count_; }
   [[nodiscard]] const PoseStamp& stamp(std::size_t i) const { return entries_[Slot(i)].stamp; }
-  [[nodiscard]] const Vec3& root_position_m(std::size_t i) const {
-    return entries_[Slot(i)].root_position_m;
-  }
-  [[nodiscard]] std::span<const Quat> rotations(std::size_t i) const {
-    return std::span(rotations_).subspan(Slot(i) * joint_count_, joint_count_);
-  }
+  [[nodiscard]] const Vec3& root_position_m(std::size_t i) const { return pose(i).root_position_m; }
+  [[nodiscard]] std::span<const Quat> rotations(std::size_t i) const { return pose(i).rotations; }
 
   /// Prefetches the poses that Display will probably read. First call it with `is_near` false, and
   /// later with true.
@@ -109,11 +135,50 @@ class PoseHistory {
   /// motion.
   std::optional<Sampled> Display(double time_s, Vec3& root_position_m, std::span<Quat> rotations);
 
+  /// Prepares the next call of Display, which must have the same arguments: adds the poses that it
+  /// needs to the evaluator. Evaluating the poses of many avatars together is faster than
+  /// evaluating those of each one in Display. Returns false if Display will return nullopt.
+  bool Prepare(double time_s, Vec3& root_position_m, std::span<Quat> rotations);
+
  private:
   [[nodiscard]] std::size_t Slot(std::size_t i) const {
     const std::size_t slot = first_ + i;
     return slot < entries_.size() ? slot : slot - entries_.size();
   }
+  /// A pose that Prepare has added to the evaluator.
+  struct Prepared {
+    MovementTime at;
+    Vec3* root_position_m = nullptr;
+    Quat* rotations = nullptr;
+  };
+  /// Describes how the pose at a time is computed.
+  struct Curve {
+    enum class Kind : std::uint8_t { kNone, kPose, kInterpolated, kMovement, kExtrapolated };
+    Kind kind = Kind::kNone;
+    std::size_t i = 0;  ///< Index of the newest pose at or before the time.
+    bool is_exact = false;
+    MovementTime movement = {};  ///< Set if the kind is kMovement.
+  };
+
+  [[nodiscard]] ConstPoseSpan pose(std::size_t i) const;
+  [[nodiscard]] std::span<Quat> RotationsAt(std::size_t slot) const {
+    return std::span(rotations_).subspan(slot * joint_count_, joint_count_);
+  }
+  /// Does what both versions of Push have in common. Returns the slot of the new entry, if any.
+  std::optional<std::size_t> PushStamp(const PoseStamp& stamp);
+  void DropOldest();
+  void AddMovement(const std::shared_ptr<const PlayedMovement>& movement);
+  /// Returns the movement that determines the pose between poses `i` and `i` + 1, if any.
+  [[nodiscard]] MovementTime MovementAt(std::size_t i, double time_s) const;
+  void EvaluateMovement(const MovementTime& at, Vec3& root_position_m,
+                        std::span<Quat> rotations) const;
+  /// Returns the neighbours of poses `i` and `i` + 1 for interpolation.
+  [[nodiscard]] std::pair<std::size_t, std::size_t> NeighboursOf(std::size_t i) const;
+  [[nodiscard]] Curve FindCurve(double time_s) const;
+  /// Adds the poses that the curve needs to the evaluator.
+  void PrepareCurve(const Curve& curve, Vec3& root_position_m, std::span<Quat> rotations);
+  void PreparePose(std::size_t i);
+
   /// Returns the index of the oldest pose after `time_s`, or size().
   [[nodiscard]] std::size_t FirstAfterTime(double time_s) const;
 
@@ -130,8 +195,11 @@ class PoseHistory {
   /// Everything about a pose except its rotations, in one cache line.
   struct alignas(64) Entry {
     PoseStamp stamp;
+    const PlayedMovement* movement = nullptr;  ///< Null: the pose is stored.
+    double movement_time_s = 0.0;
     Vec3 root_position_m = Vec3(0.0f);
     bool slope_is_before = false;  ///< The slope at the pose is that of the interval before it.
+    bool is_evaluated = false;     ///< The pose of the movement has been evaluated.
   };
   static_assert(sizeof(Entry) == 64);
 
@@ -146,13 +214,19 @@ class PoseHistory {
     double start_s = 0.0;
     Vec3 root_m = Vec3(0.0f);
     std::vector<Quat> rotations;
+    Vec3 curve_root_m = Vec3(0.0f);  ///< Scratch memory.
   };
 
   std::size_t joint_count_;
   std::size_t first_ = 0;
   std::size_t size_ = 0;
-  std::vector<Entry> entries_;
-  std::vector<Quat> rotations_;
+  // Mutable, because poses of movements are evaluated when they are first read.
+  mutable std::vector<Entry> entries_;
+  mutable std::vector<Quat> rotations_;
+  std::vector<std::shared_ptr<const PlayedMovement>> movements_;  ///< Oldest first.
+  MovementEvaluator* evaluator_ = nullptr;
+  std::array<Prepared, 2> prepared_;
+  std::size_t prepared_count_ = 0;
   double displayed_s_ = kNever;  ///< Time of the last Display.
   Correction correction_;
   std::vector<Quat> displayed_;  ///< Scratch memory.

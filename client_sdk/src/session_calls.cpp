@@ -80,7 +80,7 @@ stridewire_status SessionCommands::JoinWorld(std::string_view name, protocol::Ro
   joined.join_command = command;
   joined.view = std::make_unique<WorldView>(
       options_.pose_history, pose_budget_,
-      PoseRecording(options_.recording_s, options_.max_recording_bytes));
+      PoseRecording(options_.recording_s, options_.max_recording_bytes), options_.evaluation);
   worlds_.emplace(world, std::move(joined));
   Pump();
   return STRIDEWIRE_OK;

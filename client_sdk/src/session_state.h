@@ -40,6 +40,7 @@ struct SessionOptions {
   double connect_timeout_s = 5.0;
   double ping_interval_s = 1.0;
   double render_delay_s = -1.0;  ///< Negative: the delay adapts to the link.
+  WorldView::Evaluation evaluation = WorldView::Evaluation::kEveryTick;
   bool respawn = false;
   /// True: items of replies and events of avatars become events. False: the application reads them
   /// from the messages.

@@ -33,6 +33,7 @@ std::shared_ptr<const protocol::CompactCodecs> WorldView::MakeCodecs(
 void WorldView::ClearPoses() {
   EraseTracks([](const Track&) { return true; });
   shards_.clear();
+  shard_ticks_.clear();
   left_.clear();
   newest_time_s_ = -std::numeric_limits<double>::infinity();
 }
@@ -119,7 +120,9 @@ Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_
                           .discontinuity = (batch.flags[i] & protocol::kPoseDiscontinuity) != 0,
                           .standing = (batch.flags[i] & protocol::kPoseStanding) != 0,
                           .detail = protocol::DetailOf(info.mode)};
-    Push(*track, {info.shard, info.mode}, stamp, {root_position_m, scratch_}, counts);
+    Push(*track, {info.shard, info.mode}, stamp, counts, [&](const PoseStamp& continued) {
+      return track->history.Push(continued, root_position_m, scratch_);
+    });
   }
   recording_.Add(batch, epoch_, codecs_);
   if (shard.parts_seen >= info.parts) MarkMissingAsGone(info);
@@ -151,6 +154,7 @@ void WorldView::Prefetch(protocol::AvatarId avatar) {
     index = static_cast<std::size_t>(track - tracks_.begin());
   }
   prefetched_track_ = index + 1;
+  if (tracks_[index].continued.movement != nullptr) return;
   tracks_[index].history.PrefetchPush();
 }
 
@@ -175,12 +179,14 @@ WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
   return &tracks_[index];
 }
 
-void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose,
-                     Counts& counts) {
+template <typename PushPose>
+void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, Counts& counts,
+                     const PushPose& push) {
+  Flush(track);
   stamp.discontinuity |= track.epoch != epoch_;
   if (stamp.discontinuity || track.history.IsInterrupted()) track.segment = ++last_segment_;
   stamp.segment = track.segment;
-  if (track.history.Push(stamp, pose.root_position_m, pose.rotations)) {
+  if (push(stamp)) {
     ++counts.poses;
     track.epoch = epoch_;
     SetGone(track, false);
@@ -201,16 +207,40 @@ void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const Pos
     ++replica_counts_->refused;
     return;
   }
-  const ConstPoseSpan pose = replica.pose();
-  Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose, *replica_counts_);
-  if (!recording_.enabled()) return;
-  if (replica.movement() != nullptr && !replica.has_layers()) {
-    moving_.push_back(avatar);
-    recording_.movements().Add(avatar, stamp, replica, replicas_->library(), replicas_->tick_s(),
-                               track->recorded);
+  if (Continue(*track, shard, stamp, replica)) {
+    ++replica_counts_->poses;
+  } else {
+    PushEvaluated(*track, shard, stamp, replica);
+  }
+  if (recording_.enabled()) Record(*track, stamp, replica);
+}
+
+void WorldView::PushEvaluated(Track& track, std::uint16_t shard, const PoseStamp& stamp,
+                              const AvatarReplica& replica) {
+  const bool is_movement = HasMovementOnly(replica);
+  Flush(track);  // Needs the previous movement.
+  if (stamp.discontinuity) track.movement = nullptr;
+  if (is_movement && (recording_.enabled() || EvaluatesMovements())) KeepMovement(track, replica);
+  Push(track, {shard, protocol::PoseMode::kMovement}, stamp, *replica_counts_,
+       [&](const PoseStamp& continued) {
+         if (is_movement && EvaluatesMovements()) {
+           return track.history.Push(continued, track.movement, replica.movement_time_s(),
+                                     *evaluator_);
+         }
+         const ConstPoseSpan pose = replica.pose();
+         return track.history.Push(continued, pose.root_position_m, pose.rotations);
+       });
+}
+
+void WorldView::Record(Track& track, const PoseStamp& stamp, const AvatarReplica& replica) {
+  if (HasMovementOnly(replica)) {
+    moving_.push_back(track.avatar);
+    recording_.movements().Add(track.avatar, stamp, replica, track.movement, replicas_->library(),
+                               replicas_->tick_s(), track.recorded);
     return;
   }
-  evaluated_.push_back(avatar);
+  const ConstPoseSpan pose = replica.pose();
+  evaluated_.push_back(track.avatar);
   evaluated_flags_.push_back(
       static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
                                 (stamp.standing ? protocol::kPoseStanding : 0)));
@@ -219,6 +249,102 @@ void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const Pos
   if (block_.size() == protocol::CompactCodec::kBlock) {
     EncodeBlock(*codecs_->Find(protocol::PoseMode::kCompact));
   }
+}
+
+bool WorldView::HasMovementOnly(const AvatarReplica& replica) {
+  return replica.movement() != nullptr && !replica.has_layers();
+}
+
+void WorldView::ShardTicks::FindSample(double time_s) {
+  const std::uint64_t oldest = count - std::min<std::uint64_t>(count, ring.size());
+  sampled = count;
+  while (sampled > oldest && at(sampled - 1).time_s > time_s) --sampled;
+  is_sampled = sampled > oldest;
+  if (!is_sampled) return;
+  const Tick& start = at(--sampled);
+  share = 0.0;
+  if (start.time_s == time_s) return;
+  is_sampled = sampled + 1 < count;
+  if (is_sampled) share = (time_s - start.time_s) / (at(sampled + 1).time_s - start.time_s);
+}
+
+bool WorldView::Continue(Track& track, std::uint16_t shard, const PoseStamp& stamp,
+                         const AvatarReplica& replica) {
+  if (!EvaluatesMovements()) return false;
+  if (ticks_ == nullptr) ticks_ = &shard_ticks_[shard];
+  if (ticks_->count == 0 || stamp.tick > ticks_->at(ticks_->count - 1).tick) {
+    ticks_->ring[ticks_->count++ % ticks_->ring.size()] = {stamp.tick, stamp.time_s, step_};
+  }
+  Continued& continued = track.continued;
+  if (continued.movement == nullptr) return false;
+  const std::uint64_t last = ticks_->count - 1;
+  if (continued.ticks != ticks_ || continued.last + 1 != last ||
+      ticks_->at(last).tick != stamp.tick ||
+      ticks_->count - continued.first >= ticks_->ring.size() ||
+      continued.movement->number != replica.movement_number() || !HasMovementOnly(replica) ||
+      continued.standing != stamp.standing || stamp.discontinuity || track.epoch != epoch_) {
+    return false;
+  }
+  continued.last = last;
+  track.seen_tick = stamp.tick;
+  return true;
+}
+
+void WorldView::BeginContinuing(Track& track, double time_s) {
+  const PoseHistory& history = track.history;
+  const auto [movement, movement_s] = history.NewestMovement();
+  const PoseStamp& stamp = history.stamp(history.size() - 1);
+  if (movement == nullptr || movement != track.movement.get() || track.gone ||
+      stamp.discontinuity || time_s > stamp.time_s || history.IsCorrected(time_s)) {
+    return;
+  }
+  const ShardTicks& ticks = shard_ticks_[track.shard];
+  if (ticks.count == 0 || ticks.at(ticks.count - 1).tick != stamp.tick) return;
+  track.continued = {.movement = movement,
+                     .first_s = movement_s,
+                     .ticks = &ticks,
+                     .first = ticks.count - 1,
+                     .last = ticks.count - 1,
+                     .standing = stamp.standing};
+}
+
+double WorldView::MovementTimeAt(const Continued& continued, std::uint64_t i) const {
+  const ShardTicks& ticks = *continued.ticks;
+  double time_s = continued.first_s;
+  const std::uint64_t steps = ticks.at(i).step - ticks.at(continued.first).step;
+  for (std::uint64_t step = 0; step < steps; ++step) time_s += tick_s_;
+  return time_s;
+}
+
+void WorldView::Flush(Track& track) {
+  if (track.continued.movement == nullptr) return;
+  const Continued continued = std::exchange(track.continued, {});
+  const ShardTicks& ticks = *continued.ticks;
+  if (!ticks.Has(continued.first)) return;
+  double movement_s = continued.first_s;
+  std::uint64_t step = ticks.at(continued.first).step;
+  for (std::uint64_t i = continued.first + 1; i <= continued.last; ++i) {
+    const ShardTicks::Tick& tick = ticks.at(i);
+    for (; step < tick.step; ++step) movement_s += tick_s_;
+    track.history.Push({.tick = tick.tick,
+                        .time_s = tick.time_s,
+                        .segment = track.segment,
+                        .standing = continued.standing},
+                       track.movement, movement_s, *evaluator_);
+  }
+  track.history.SetDisplayed(sampled_s_);
+}
+
+void WorldView::FlushAll() {
+  for (Track& track : tracks_) Flush(track);
+}
+
+void WorldView::KeepMovement(Track& track, const AvatarReplica& replica) {
+  if (track.movement != nullptr && track.movement->number == replica.movement_number()) return;
+  auto kept = std::make_shared<PlayedMovement>(*replica.movement(), replica.movement_number(),
+                                               replica.previous_end_s());
+  if (!kept->movement.is_inertial) kept->movement.difference_velocity = {};
+  track.movement = std::move(kept);
 }
 
 void WorldView::EncodeBlock(const protocol::CompactCodec& codec) {
@@ -272,11 +398,20 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
     return Fail(ErrorCode::kShapeMismatch,
                 "the library has another number of joints than the skeleton");
   }
+  if (evaluator_ == nullptr || evaluator_->library() != replicas.library() ||
+      tick_s_ != replicas.tick_s()) {
+    FlushAll();
+    for (Track& track : tracks_) track.history.EvaluateAll();
+    tick_s_ = replicas.tick_s();
+    evaluator_ = std::make_unique<MovementEvaluator>(replicas.library());
+  }
   ++counts.batches;
   newest_time_s_ = std::max(newest_time_s_, movements.server_time_s);
   replica_every_n_ticks_ = std::max<std::uint64_t>(every_n_ticks, 1);
   replica_counts_ = &counts;
   replicas_ = &replicas;
+  ticks_ = nullptr;
+  step_ = movements.step;
   moving_.clear();
   evaluated_.clear();
   evaluated_flags_.clear();
@@ -321,6 +456,7 @@ void WorldView::Remove(protocol::AvatarId avatar) {
 
 void WorldView::SetGone(Track& track, bool gone) {
   if (track.gone == gone) return;
+  Flush(track);
   track.gone = gone;
   if (gone) {
     ++gone_count_;
@@ -333,19 +469,53 @@ void WorldView::SetGone(Track& track, bool gone) {
 void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displayed) {
   const std::size_t joints = skeleton_.joints.size();
   out.Resize(tracks_.size(), joints);
-  std::size_t count = 0;
+  const auto rotations_of = [&](std::size_t pose) {
+    return std::span(out.rotations).subspan(pose * joints, joints);
+  };
+  const auto is_after_newest = [time_s](const PoseHistory& history) {
+    return time_s > history.stamp(history.size() - 1).time_s;
+  };
+  for (auto& [shard, ticks] : shard_ticks_) ticks.FindSample(time_s);
+  sampled_tracks_.clear();
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (i + 2 < tracks_.size()) tracks_[i + 2].history.Prefetch(time_s, false);
-    if (i + 1 < tracks_.size()) tracks_[i + 1].history.Prefetch(time_s, true);
+    const std::size_t pose = sampled_tracks_.size();
+    if (const Continued& continued = tracks_[i].continued; IsSampled(continued)) {
+      const ShardTicks& ticks = *continued.ticks;
+      double movement_s = MovementTimeAt(continued, ticks.sampled);
+      if (ticks.share > 0.0) {
+        movement_s += ticks.share * (MovementTimeAt(continued, ticks.sampled + 1) - movement_s);
+      }
+      evaluator_->Add(continued.movement->movement, movement_s, out.roots_m[pose],
+                      rotations_of(pose));
+      sampled_tracks_.push_back(i);
+      continue;
+    }
+    Flush(tracks_[i]);
+    if (i + 1 < tracks_.size()) tracks_[i + 1].history.Prefetch(time_s, false);
+    PoseHistory& history = tracks_[i].history;
+    if (history.size() == 0 || (tracks_[i].gone && is_after_newest(history))) continue;
+    if (history.Prepare(time_s, out.roots_m[pose], rotations_of(pose))) {
+      sampled_tracks_.push_back(i);
+    }
+  }
+  if (evaluator_ != nullptr) evaluator_->Evaluate();
+  std::size_t count = 0;
+  for (const std::size_t i : sampled_tracks_) {
     Track& track = tracks_[i];
+    out.avatars[count] = track.avatar;
+    if (track.continued.movement != nullptr) {
+      displayed.Add({.interpolated = true}, false);
+      out.flags[count++] = track.continued.standing ? kCrowdStanding : 0;
+      continue;
+    }
+    if (count + 1 < sampled_tracks_.size()) {
+      const Track& next = tracks_[sampled_tracks_[count + 1]];
+      if (next.continued.movement == nullptr) next.history.Prefetch(time_s, true);
+    }
     PoseHistory& history = track.history;
-    if (history.size() == 0) continue;
-    const bool is_after_newest = time_s > history.stamp(history.size() - 1).time_s;
-    if (track.gone && is_after_newest) continue;
-    const auto rotations = std::span(out.rotations).subspan(count * joints, joints);
-    const auto sampled = history.Display(time_s, out.roots_m[count], rotations);
-    if (!sampled) continue;
-    displayed.Add(*sampled, is_after_newest);
+    const auto sampled = history.Display(time_s, out.roots_m[count], rotations_of(count));
+    STRIDEWIRE_CHECK(sampled.has_value());
+    displayed.Add(*sampled, is_after_newest(history));
     const PoseStamp& stamp = history.stamp(sampled->index);
     int flags = CrowdFlagsOf(stamp);
     if (sampled->extrapolated) {
@@ -353,13 +523,15 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
     } else if (!sampled->interpolated) {
       flags |= kCrowdHeld;
     }
-    out.avatars[count] = track.avatar;
     out.flags[count++] = static_cast<std::uint8_t>(flags);
+    if (EvaluatesMovements()) BeginContinuing(track, time_s);
   }
+  sampled_s_ = time_s;
   out.Resize(count, joints);
 }
 
 void WorldView::RenumberSegments() {
+  FlushAll();
   for (Track& track : tracks_) {
     PoseHistory& history = track.history;
     std::optional<std::uint32_t> old;
@@ -374,12 +546,9 @@ void WorldView::RenumberSegments() {
 
 PoseHistory* WorldView::Find(protocol::AvatarId avatar) {
   const auto track = LowerBound(avatar);
-  return track != tracks_.end() && track->avatar == avatar ? &track->history : nullptr;
-}
-
-const PoseHistory* WorldView::Find(protocol::AvatarId avatar) const {
-  const Track* track = FindTrack(avatar);
-  return track == nullptr ? nullptr : &track->history;
+  if (track == tracks_.end() || track->avatar != avatar) return nullptr;
+  Flush(*track);
+  return &track->history;
 }
 
 bool WorldView::IsGone(protocol::AvatarId avatar) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -59,10 +60,20 @@ class WorldView : public PoseSink {
     std::uint64_t missing = 0;  ///< Estimated number of missing batches, from gaps in the ticks.
   };
 
+  /// When poses of movements are evaluated.
+  enum class Evaluation : std::uint8_t {
+    kEveryTick,    ///< In every tick. For applications that read the poses of ticks.
+    kWhenSampled,  ///< When they are read. For applications that sample all avatars per frame.
+  };
+
   /// `recording` defines the limits of the view's recording. By default nothing is recorded.
   WorldView(std::size_t pose_history, PoseBudget& budget,
-            PoseRecording recording = PoseRecording(0.0, 0))
-      : pose_history_(pose_history), budget_(budget), recording_(std::move(recording)) {}
+            PoseRecording recording = PoseRecording(0.0, 0),
+            Evaluation evaluation = Evaluation::kEveryTick)
+      : pose_history_(pose_history),
+        budget_(budget),
+        evaluation_(evaluation),
+        recording_(std::move(recording)) {}
   ~WorldView() override { Clear(); }
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
@@ -111,7 +122,6 @@ class WorldView : public PoseSink {
   void RenumberSegments();
 
   /// Returns the poses of an avatar, or null if it is unknown.
-  [[nodiscard]] const PoseHistory* Find(protocol::AvatarId avatar) const;
   [[nodiscard]] PoseHistory* Find(protocol::AvatarId avatar);
   [[nodiscard]] bool IsGone(protocol::AvatarId avatar) const;
 
@@ -119,15 +129,6 @@ class WorldView : public PoseSink {
   [[nodiscard]] std::vector<protocol::AvatarId> Avatars() const;
   /// Changes whenever the result of Avatars changes.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-
-  /// Calls `call(avatar, history, is_gone)` for every avatar with poses, in ascending order.
-  /// Avatars that are gone are included until their poses are erased.
-  template <typename Call>
-  void ForEach(const Call& call) const {
-    for (const Track& track : tracks_) {
-      if (track.history.size() > 0) call(track.avatar, track.history, track.gone);
-    }
-  }
 
   /// The poses of the last seconds, as received batches. If they were evaluated, the recording
   /// contains the movements, and the poses with layers in compact form. Clear also clears them.
@@ -145,16 +146,49 @@ class WorldView : public PoseSink {
   [[nodiscard]] double newest_time_s() const { return newest_time_s_; }
 
  private:
+  /// The last ticks of a shard that had evaluated poses. Ticks are numbered from 0 on.
+  struct ShardTicks {
+    struct Tick {
+      std::uint64_t tick = 0;
+      double time_s = 0.0;
+      std::uint64_t step = 0;  ///< Movements::step
+    };
+    std::array<Tick, 64> ring;
+    std::uint64_t count = 0;
+    [[nodiscard]] const Tick& at(std::uint64_t i) const { return ring[i % ring.size()]; }
+    [[nodiscard]] bool Has(std::uint64_t i) const { return count - i <= ring.size(); }
+
+    // Scratch memory of SampleAll: the sampled time is `share` of the way from `sampled` to the
+    // next tick. If there is no such tick, `is_sampled` is false.
+    std::uint64_t sampled = 0;
+    double share = 0.0;
+    bool is_sampled = false;
+    void FindSample(double time_s);
+  };
+  /// A movement that continues without any change. The poses of its ticks after `first` are not in
+  /// the history yet. SampleAll evaluates the movement without reading the history, and ticks do
+  /// not write to it. This saves most cache misses.
+  struct Continued {
+    const PlayedMovement* movement = nullptr;  ///< Null: the history contains all poses.
+    double first_s = 0.0;                      ///< Time of the movement at `first`.
+    const ShardTicks* ticks = nullptr;
+    std::uint64_t first = 0;  ///< Number of the newest tick in the history.
+    std::uint64_t last = 0;   ///< Number of the newest tick.
+    bool standing = false;
+  };
   struct Track {
+    // The members that are read in every tick come first.
     protocol::AvatarId avatar = 0;
-    PoseHistory history;
     std::uint16_t shard = 0;
     protocol::PoseMode mode = protocol::PoseMode::kFull;
+    bool gone = false;
+    std::uint32_t segment = 0;  ///< Segment of the newest pose.
+    Continued continued;
     std::uint64_t seen_tick = 0;
     std::uint64_t epoch = 0;
-    std::uint32_t segment = 0;  ///< Segment of the newest pose.
-    bool gone = false;
+    PoseHistory history;
     MovementRecording::Cursor recorded;
+    std::shared_ptr<const PlayedMovement> movement;  ///< A copy of the current movement, or null.
   };
   struct Shard {
     std::uint64_t tick = 0;  ///< Tick of the last batch.
@@ -170,6 +204,9 @@ class WorldView : public PoseSink {
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
   [[nodiscard]] std::uint64_t EveryNTicks() const override { return replica_every_n_ticks_; }
+  [[nodiscard]] bool EvaluatesMovements() const override {
+    return evaluation_ == Evaluation::kWhenSampled;
+  }
   /// Returns the first track whose avatar is not below `avatar`.
   [[nodiscard]] std::vector<Track>::iterator LowerBound(protocol::AvatarId avatar);
   [[nodiscard]] const Track* FindTrack(protocol::AvatarId avatar) const;
@@ -179,7 +216,34 @@ class WorldView : public PoseSink {
   /// Returns the index of the track, or one after the end if it is not among the tracks shortly
   /// after `index`.
   [[nodiscard]] std::size_t FindTrackAfter(std::size_t index, protocol::AvatarId avatar) const;
-  void Push(Track& track, const Lane& lane, PoseStamp stamp, ConstPoseSpan pose, Counts& counts);
+  /// Calls `push(stamp)` to add a pose to the history.
+  template <typename PushPose>
+  void Push(Track& track, const Lane& lane, PoseStamp stamp, Counts& counts, const PushPose& push);
+  /// Returns true if an avatar has a movement and no layers.
+  [[nodiscard]] static bool HasMovementOnly(const AvatarReplica& replica);
+  void PushEvaluated(Track& track, std::uint16_t shard, const PoseStamp& stamp,
+                     const AvatarReplica& replica);
+  void Record(Track& track, const PoseStamp& stamp, const AvatarReplica& replica);
+  /// Adds the last tick of the avatar to the movement that continues. Returns false if it does not
+  /// continue or if the history must be updated.
+  bool Continue(Track& track, std::uint16_t shard, const PoseStamp& stamp,
+                const AvatarReplica& replica);
+  /// Begins to continue the newest movement, if nothing but the history determines the motion.
+  void BeginContinuing(Track& track, double time_s);
+  /// Returns the time in the movement at a tick, summed tick by tick as replicas do.
+  [[nodiscard]] double MovementTimeAt(const Continued& continued, std::uint64_t i) const;
+  /// Returns true if SampleAll can evaluate the movement at its time.
+  [[nodiscard]] static bool IsSampled(const Continued& continued) {
+    if (continued.movement == nullptr || !continued.ticks->is_sampled) return false;
+    const ShardTicks& ticks = *continued.ticks;
+    return ticks.Has(continued.first) && ticks.sampled >= continued.first &&
+           ticks.sampled + (ticks.share > 0.0 ? 1 : 0) <= continued.last;
+  }
+  /// Adds the poses of the movement that continues to the history.
+  void Flush(Track& track);
+  void FlushAll();
+  /// Copies the movement of an avatar unless the track has it already.
+  static void KeepMovement(Track& track, const AvatarReplica& replica);
 
   /// Records the poses of the avatars in `evaluated_`, which a message with movements has produced.
   void RecordEvaluated(const protocol::Movements& movements);
@@ -197,6 +261,8 @@ class WorldView : public PoseSink {
 
   std::size_t pose_history_;
   PoseBudget& budget_;
+  Evaluation evaluation_;
+  std::unique_ptr<MovementEvaluator> evaluator_;  // Null before the first movement.
   bool has_info_ = false;
   protocol::SkeletonInfo skeleton_;
   std::string library_hash_;
@@ -217,6 +283,12 @@ class WorldView : public PoseSink {
   PoseRecording recording_;
   double newest_time_s_ = -std::numeric_limits<double>::infinity();
   std::vector<Quat> scratch_;
+  std::map<std::uint16_t, ShardTicks> shard_ticks_;
+  ShardTicks* ticks_ = nullptr;  // Ticks of the shard of the current message; null: not known yet.
+  std::uint64_t step_ = 0;       // Step of the current message.
+  double tick_s_ = 0.0;          // Length of a tick of the last replicas.
+  double sampled_s_ = 0.0;       // Time of the last SampleAll.
+  std::vector<std::size_t> sampled_tracks_;  // Scratch memory of SampleAll.
   // Interval of poses in ticks, as requested. Set while Apply(Movements) runs.
   std::uint64_t replica_every_n_ticks_ = 1;
   const ReplicaSet* replicas_ = nullptr;  // Set while Apply(Movements) runs.

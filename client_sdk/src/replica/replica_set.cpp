@@ -73,7 +73,8 @@ void ReplicaSet::AdvanceDue(const protocol::Movements& message, bool emits, Pose
                             {.length_s = tick_s_,
                              .number = message.step,
                              .has_poses = has_poses,
-                             .ticks_apart = static_cast<int>(every_n_ticks)},
+                             .ticks_apart = static_cast<int>(every_n_ticks),
+                             .only_layered = sink.EvaluatesMovements()},
                             evaluator_);
   if (!has_poses) return;
   // The poses and the memory of the sink are usually in no processor cache. They are prefetched
@@ -81,7 +82,7 @@ void ReplicaSet::AdvanceDue(const protocol::Movements& message, bool emits, Pose
   constexpr std::size_t kPrefetched = 2;
   for (std::size_t i = 0; i < due_.size() + kPrefetched; ++i) {
     if (i < due_.size()) {
-      due_[i]->replica->PrefetchPose();
+      if (!sink.EvaluatesMovements()) due_[i]->replica->PrefetchPose();
       sink.Prefetch(due_[i]->id);
     }
     if (i >= kPrefetched) EmitPose(message, *due_[i - kPrefetched], sink);

@@ -34,6 +34,10 @@ class PoseSink {
   /// true, the avatar appears when the server sends its next state.
   [[nodiscard]] virtual bool Wants(protocol::AvatarId) const { return true; }
 
+  /// True: the sink evaluates movements without layers itself. In OnPose, it must not read
+  /// replica.pose() of avatars that have a movement and no layers.
+  [[nodiscard]] virtual bool EvaluatesMovements() const { return false; }
+
   /// The set evaluates only poses of ticks that are multiples of this number, at least 1.
   [[nodiscard]] virtual std::uint64_t EveryNTicks() const { return 1; }
 };

@@ -312,6 +312,7 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.seed = static_cast<std::uint64_t>(numbers[8]);
   options.respawn = numbers[10] != 0.0;  // numbers[9] limits the events, which the module ignores.
   options.detailed_events = false;
+  options.evaluation = WorldView::Evaluation::kWhenSampled;
   auto client = std::make_unique<Client>(options);
   client->has_library_cache = numbers[11] != 0.0;
   return client.release();

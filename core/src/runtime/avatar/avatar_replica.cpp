@@ -187,6 +187,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& 
   if ((flags & (record::kIsState | record::kLeft | record::kMoves)) != 0) {
     ahead_count_ = 0;
     ++movement_number_;
+    previous_end_s_ = -1.0;
   }
   if ((flags & record::kIsState) != 0) {
     ReadState(flags, reader);
@@ -230,6 +231,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& 
     if (movement.feet.is_active && (flags & record::kIsRedirected) == 0)
       body_.CaptureFootLocks(left_s);
     is_moving_ = false;
+    previous_end_s_ = left_s;
   }
   if (has_begun) {
     double time_s = 0.0;
@@ -356,6 +358,7 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, const T
       if (!replica.is_time_set_) replica.movement_time_s_ += tick.length_s;
       ++replica.ahead_tick_;
       if (!tick.has_poses || replica.HasAheadPose()) continue;
+      if (tick.only_layered && !replica.may_have_layers_) continue;
       const Movement& movement = replica.body_.movement;
       // Replicas that are next to each other evaluate poses in the same tick, so that they can be
       // evaluated side by side. Different groups of replicas do so in different ticks, to

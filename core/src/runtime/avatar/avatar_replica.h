@@ -43,6 +43,8 @@ class AvatarReplica {
     std::uint64_t number = 0;  ///< Must increase by 1 from tick to tick.
     bool has_poses = true;     ///< False: poses of this tick are not needed.
     int ticks_apart = 1;       ///< Number of ticks between poses. Other ticks cost more.
+    /// True: only poses with layers are needed, so movements without layers are not evaluated.
+    bool only_layered = false;
   };
 
   /// The avatar's state is unknown until the replica receives a record with a whole state.
@@ -81,6 +83,9 @@ class AvatarReplica {
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
   /// Changes whenever a record begins or sets a movement. A movement does not change meanwhile.
   [[nodiscard]] std::uint32_t movement_number() const { return movement_number_; }
+  /// Time at which the previous movement ended when this one began. Negative if the movement did
+  /// not begin at the end of another one.
+  [[nodiscard]] double previous_end_s() const { return previous_end_s_; }
   /// Time since the start of the movement, of the last tick. Undefined while standing.
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// True if layers change the displayed pose.
@@ -124,6 +129,7 @@ class AvatarReplica {
   std::uint32_t ahead_tick_ = 0;       // Number of ticks since that of the first of these poses.
   std::vector<Quat> ahead_rotations_;  // [kPosesAhead][joint]
   std::array<Vec3, kPosesAhead> ahead_roots_m_ = {};
+  double previous_end_s_ = -1.0;
   AvatarBody body_;
 };
 
