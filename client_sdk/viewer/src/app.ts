@@ -8,7 +8,7 @@ import {AvatarCommands, initialWalkerCount} from './avatar_commands.js';
 import type {CommandHost} from './avatar_commands.js';
 import {CameraControl} from './camera_control.js';
 import {ConnectionStatus} from './connection_status.js';
-import {button, h, icon, setPressed, setText} from './dom.js';
+import {button, h, icon, setPressed} from './dom.js';
 import {EmptyWorldCard} from './empty_world_card.js';
 import {FootprintTool} from './footprint_tool.js';
 import {FrameLimiter} from './frame_limiter.js';
@@ -34,6 +34,7 @@ import {WorldView, projected} from './scene/world_view.js';
 import {Client} from './sdk.js';
 import {applyTheme, makeColours, preferredTheme, rememberTheme} from './theme.js';
 import type {ThemeName} from './theme.js';
+import {Toast} from './toast.js';
 import {parseUrlOptions} from './url_options.js';
 import {WalkTool} from './walk_tool.js';
 import type {WalkHost} from './walk_tool.js';
@@ -51,8 +52,6 @@ const serverInfoIntervalMs = 4000;
 const playbackRangeS = 20;
 /** The selection ends when its avatar has been missing from the world for this time. */
 const selectionTimeoutMs = 3000;
-/** Time for which a message is shown over the scene. */
-const toastMs = 8000;
 /** Pointer distance, in CSS pixels, within which a click selects an avatar. */
 const pickReachPx = 28;
 
@@ -113,8 +112,7 @@ export class App {
   private readonly viewPanel: ViewPanel;
   private readonly sidePanels = new SidePanels(() => this.invalidateLayout());
   private readonly status: ConnectionStatus;
-  private readonly toast = h('div', {class: 'toast', role: 'status'});
-  private toastUntilMs = 0;
+  private readonly toast = new Toast();
   private readonly emptyCard = new EmptyWorldCard(() =>
     void this.commands.spawn(this.commandedPane(), initialWalkerCount, true));
   private readonly helpDialog = makeHelp();
@@ -202,10 +200,9 @@ export class App {
           'Library'),
         this.frameButton, this.followButton, this.themeButton, help));
     this.bottom = h('footer', {class: 'bottom'}, this.playbackControls.element);
-    this.toast.hidden = true;
     root.replaceChildren(this.canvas, overlayCanvas, this.top, this.sidePanels.left,
-      this.sidePanels.right, this.emptyCard.element, this.toast, this.status.notice, this.bottom,
-      this.helpDialog);
+      this.sidePanels.right, this.emptyCard.element, this.toast.element, this.status.notice,
+      this.bottom, this.helpDialog);
 
     this.setTheme(this.theme, false);
     this.sidePanels.setOpen('commands', !isNarrowPage());
@@ -364,14 +361,12 @@ export class App {
   /** Shows a message in the command panel, or over the scene if that panel is closed. */
   private notify(text: string): void {
     this.commandPanel.showMessage(text);
-    this.toastUntilMs = performance.now() + toastMs;
-    setText(this.toast, text);
+    this.toast.show(text);
     this.updateToast();
   }
 
   private updateToast(): void {
-    this.toast.hidden =
-      performance.now() > this.toastUntilMs || this.sidePanels.isOpen('commands');
+    this.toast.update(this.sidePanels.isOpen('commands'));
   }
 
   /** Returns the pane whose world receives commands. */
