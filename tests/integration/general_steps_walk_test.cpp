@@ -238,7 +238,7 @@ struct Selection {
 };
 class GeneralStepsCaptured : public testing::TestWithParam<Selection> {};
 INSTANTIATE_TEST_SUITE_P(Steps, GeneralStepsCaptured,
-                         testing::Values(Selection{"All", LibraryBuilder()},
+                         testing::Values(Selection{"All", LibraryBuilder::KeepingAll()},
                                          Selection{"Selected", LibraryBuilder::Selecting()}),
                          [](const auto& selection) { return selection.param.name; });
 

@@ -113,7 +113,8 @@ class CapturedWalk : public testing::TestWithParam<bool> {
   void SetUp() override {
     const std::vector<std::string> subjects = {"16"};
     STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
-    LibraryBuilder builder = GetParam() ? LibraryBuilder() : LibraryBuilder::Selecting();
+    LibraryBuilder builder =
+        GetParam() ? LibraryBuilder::KeepingAll() : LibraryBuilder::Selecting();
     library_ = builder.Build(AssembleTakes(TakesOf(subjects), {})).value();
   }
   Library library_;

@@ -80,7 +80,7 @@ inline std::shared_ptr<const MotionLibrary> LibraryOf(const std::vector<std::str
 /// captured. A reference for synthesized movements.
 inline std::shared_ptr<const MotionLibrary> LibraryOfAll(const std::vector<std::string>& subjects) {
   if (subjects.empty()) return OpenLibrary("builtin").value();
-  return BuildFromTakes(TakesOf(subjects), LibraryBuilder{});
+  return BuildFromTakes(TakesOf(subjects), LibraryBuilder::KeepingAll());
 }
 
 }  // namespace stridewire

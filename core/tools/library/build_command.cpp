@@ -188,7 +188,7 @@ int RunBuild(const BuildCommand& command) {
   auto raw = captures->assembler.Assemble();
   if (!raw) return report.Fail(Describe(raw.error()), kExitBadInput);
   if (!command.no_complete && options.steps) report.AddCompletion(CompleteLibrary(*raw));
-  LibraryBuilder builder = command.all ? LibraryBuilder() : LibraryBuilder::Selecting();
+  LibraryBuilder builder = command.all ? LibraryBuilder::KeepingAll() : LibraryBuilder::Selecting();
   if (!command.all) builder.selection.max_pose_error_m = command.max_pose_error_m;
   const auto library = builder.Build(*raw);
   progress.Clear();

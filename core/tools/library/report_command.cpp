@@ -94,7 +94,7 @@ std::shared_ptr<const MotionLibrary> ReadCaptures(const std::vector<std::string>
     PrintInputError(raw.error());
     return nullptr;
   }
-  const auto library = LibraryBuilder().Build(*raw);
+  const auto library = LibraryBuilder::KeepingAll().Build(*raw);
   if (!library) {
     PrintInputError(library.error());
     return nullptr;

@@ -68,9 +68,13 @@ struct GroupSelection {
 /// generic-time grid, aligns quaternion hemispheres, selects or averages examples as configured,
 /// and solves for the interpolation weights.
 struct LibraryBuilder {
+  /// Returns a builder configured to store all captured movements. It bends toes that are in the
+  /// ground and changes nothing else.
+  [[nodiscard]] static LibraryBuilder KeepingAll();
   /// Returns a builder configured to keep a representative selection of captured movements. It
   /// averages movements within 5 cm of each other. It drops outliers beyond five deviations, and
-  /// movements that the others reproduce within 2.5 cm. Finally, it smooths the kept movements.
+  /// movements that the others reproduce within 2.5 cm. Finally, it smooths the kept movements and
+  /// bends toes that are in the ground.
   [[nodiscard]] static LibraryBuilder Selecting();
 
   /// Approximate number of grid cells per second of mean duration. Intervals in which an example
@@ -86,6 +90,8 @@ struct LibraryBuilder {
   /// variation. Leave-one-out pose errors determine the smoothness. Groups with fewer than 4 (d +
   /// 1) examples (d parameters) remain unchanged.
   bool smooths = false;
+  /// True: in groups that were not completed, toes bend upward where their tips are in the ground.
+  bool bends_toes = false;
 
   struct Note {
     int group = 0;

@@ -9,6 +9,7 @@
 
 #include "base/check.h"
 #include "offline/base/text.h"
+#include "offline/build/bend_toes.h"
 #include "offline/build/grid_cells.h"
 #include "offline/build/grid_example.h"
 #include "offline/build/layers.h"
@@ -178,22 +179,31 @@ Status FitSmoothWeights(std::span<const double> scales, StoredGroup& stored,
   return {};
 }
 
+Status ValidateExamples(const RawLibrary& raw) {
+  for (const RawGroup& group : raw.groups) {
+    for (const RawExample& example : group.examples) {
+      Status status = ValidateExample(group, example, raw.skeleton.joint_count());
+      if (!status) return status;
+    }
+  }
+  return {};
+}
+
 // Converts the groups of a raw library to the form in which library files contain them.
 class GroupConverter {
  public:
-  // The converter appends its notes and selections to those of `builder`.
+  // All examples of `raw` must be valid. The converter appends its notes and selections to those of
+  // `builder`.
   GroupConverter(const RawLibrary& raw, LibraryBuilder& builder)
-      : raw_(raw), builder_(builder), layout_(raw.skeleton.joint_count()) {}
+      : raw_(raw), builder_(builder), layout_(raw.skeleton.joint_count()) {
+    if (builder.bends_toes) toes_.emplace(raw);
+  }
 
   // Converts a group of the library. Groups without examples are skipped.
   Status Add(std::size_t index) {
     const RawGroup& group = raw_.groups[index];
     if (group.examples.empty()) return {};
     index_ = static_cast<int>(index);
-    for (const RawExample& example : group.examples) {
-      Status status = ValidateExample(group, example, raw_.skeleton.joint_count());
-      if (!status) return status;
-    }
     const std::vector<int> cells = ChooseCells(group, builder_.grid_fps, layout_, stand_root());
     std::optional<Smoothness> smoothness;
     const std::vector<GridExample> examples = SelectExamples(group, cells, smoothness);
@@ -251,6 +261,10 @@ class GroupConverter {
       Note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
     }
     if (builder_.smooths && selects && IsStep(group.kind)) SmoothNoise(examples);
+    // The toes bend last, so that the selection does not depend on them.
+    if (toes_ && selects) {
+      for (GridExample& example : examples) toes_->Bend(group.kind, cells, layout_, example);
+    }
     STRIDEWIRE_CHECK(report.examples.size() == group.examples.size());
     builder_.selections.push_back(std::move(report));
     return examples;
@@ -331,12 +345,19 @@ class GroupConverter {
   const RawLibrary& raw_;
   LibraryBuilder& builder_;
   GridLayout layout_;
+  std::optional<ToeBender> toes_;
   int index_ = 0;                                     // Index of the current group.
   std::vector<std::unique_ptr<StoredGroup>> groups_;  // Own the data to which `views_` refer.
   std::vector<MotionGroup> views_;
 };
 
 }  // namespace
+
+LibraryBuilder LibraryBuilder::KeepingAll() {
+  LibraryBuilder builder;
+  builder.bends_toes = true;
+  return builder;
+}
 
 // Captured steps with equal parameters differ by centimetres. Without averaging, weights would
 // change abruptly between them. The error bound of 2.5 cm is a compromise: of subject 16, it keeps
@@ -345,7 +366,7 @@ class GroupConverter {
 // deviations drops a recovery after a jump and the last step before a sharp turn. A limit of three
 // would also drop the first steps of walks.
 LibraryBuilder LibraryBuilder::Selecting() {
-  LibraryBuilder builder;
+  LibraryBuilder builder = KeepingAll();
   builder.cluster_diameter = 0.05;
   builder.smooths = true;
   builder.selection = {.max_pose_error_m = 0.025, .outlier_deviations = 5.0};
@@ -359,6 +380,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
   if (static_cast<int>(raw.stand_pose.rotations.size()) != raw.skeleton.joint_count()) {
     return Fail(ErrorCode::kShapeMismatch, "stand_pose and skeleton have different joints");
   }
+  if (Status status = ValidateExamples(raw); !status) return std::unexpected(status.error());
   GroupConverter converter(raw, *this);
   for (std::size_t g = 0; g < raw.groups.size(); ++g) {
     if (Status status = converter.Add(g); !status) return std::unexpected(status.error());

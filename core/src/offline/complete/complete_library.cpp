@@ -9,6 +9,7 @@
 
 #include "offline/base/parallel.h"
 #include "offline/base/text.h"
+#include "offline/build/bend_toes.h"
 #include "offline/build/grid_cells.h"
 #include "offline/builtin/figure.h"
 #include "offline/complete/basic_steps.h"
@@ -87,6 +88,15 @@ LegRig RigOf(const RawLibrary& library) {
   return MakeLegRig(library.skeleton, library.stand_pose, hinges);
 }
 
+// LibraryBuilder bends the toes of captured steps, so generated steps must follow bent toes too.
+RawLibrary WithBentToes(RawLibrary library) {
+  const ToeBender toes(library);
+  for (RawGroup& group : library.groups) {
+    for (RawExample& example : group.examples) toes.Bend(group.kind, example);
+  }
+  return library;
+}
+
 // Describes a generated step, as the source of its example.
 std::string SourceOf(const BasicStep& step) {
   std::string text =
@@ -104,8 +114,9 @@ std::string SourceOf(const BasicStep& step) {
 // Measures the person in the captures. If they contain no stand, also composes the stand pose of
 // the library. Returns nullopt and sets `completion.failure` if no steps can be generated.
 std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion) {
-  std::optional<StrideModel> left = complete::MeasureStride(library, Foot::kLeft);
-  std::optional<StrideModel> right = complete::MeasureStride(library, Foot::kRight);
+  const RawLibrary bent = WithBentToes(library);
+  std::optional<StrideModel> left = complete::MeasureStride(bent, Foot::kLeft);
+  std::optional<StrideModel> right = complete::MeasureStride(bent, Foot::kRight);
   const bool has_strides = left && right;
   Person person{.skeleton = library.skeleton, .rig = RigOf(library), .stand = {}, .strides = {}};
   if (has_strides) person.strides = {*std::move(left), *std::move(right)};
@@ -117,7 +128,7 @@ std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion)
   if (!reason && library.stand_tilt_m > kMaxTiltM) reason = "the feet are on their heels or toes";
   if (reason) {
     const auto parts = has_strides ? complete::MeasureStandParts(person.strides)
-                                   : complete::MeasureStandParts(library);
+                                   : complete::MeasureStandParts(bent);
     if (!parts) {
       completion.failure =
           "the captures contain neither a stand nor steps of both feet: in the stillest pose " +

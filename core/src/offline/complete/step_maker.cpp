@@ -10,9 +10,9 @@
 #include "base/check.h"
 #include "base/easing.h"
 #include "offline/base/moving_window.h"
+#include "offline/build/bend_toes.h"
 #include "offline/builtin/leg_ik.h"
 #include "offline/builtin/swing_detour.h"
-#include "offline/extract/bend_toes.h"
 #include "offline/extract/extract.h"
 #include "runtime/library/keytimes.h"
 

@@ -8,7 +8,6 @@
 
 #include "base/check.h"
 #include "offline/base/statistics.h"
-#include "offline/extract/bend_toes.h"
 #include "offline/extract/level_feet.h"
 #include "offline/extract/mirror.h"
 #include "runtime/library/knee_hinges.h"
@@ -163,7 +162,6 @@ class Assembler {
                       : "the captures contain no usable step or jump");
     }
     SetStandPose(library);
-    BendToes(leveller_->rig(), ball_height_m_, library);
     return library;
   }
 

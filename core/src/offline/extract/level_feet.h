@@ -30,8 +30,6 @@ class FeetLeveller {
   /// foot is too far from the ground to stand on it.
   void Level(PoseSpan stand) const;
 
-  [[nodiscard]] const LegRig& rig() const { return rig_; }
-
  private:
   // Raises the balls by `feet_m` [foot] and the root by `root_m`.
   void Raise(const std::array<double, 2>& feet_m, double root_m, PoseSpan pose) const;

@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 
+#include "offline/build/bend_toes.h"
 #include "offline/builtin/figure.h"
 #include "offline/builtin/step.h"
 #include "offline/complete/generic_stride.h"
-#include "offline/extract/bend_toes.h"
 #include "runtime/library/knee_hinges.h"
 #include "runtime/skeleton/foot_vector.h"
 

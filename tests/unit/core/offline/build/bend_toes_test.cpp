@@ -1,4 +1,4 @@
-#include "offline/extract/bend_toes.h"
+#include "offline/build/bend_toes.h"
 
 #include <gtest/gtest.h>
 
@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include "offline/base/degrees.h"
+#include "offline/build/grid_cells.h"
 #include "offline/builtin/figure.h"
 #include "offline/builtin/step.h"
-#include "runtime/library/knee_hinges.h"
 
 namespace stridewire {
 namespace {
@@ -20,7 +20,6 @@ constexpr std::array kToes = {builtin::kLeftToeBase, builtin::kRightToeBase};
 struct StiffToes {
   RawLibrary library;
   LegRig rig;
-  std::array<double, 2> ball_height_m{};
 
   StiffToes() {
     library.skeleton = builtin::MakeFigure();
@@ -37,10 +36,7 @@ struct StiffToes {
           clip.frame(i).rotations[toe] = library.stand_pose.rotations[toe];
       }
     }
-    const std::array clips = {&library.groups.front().examples.front().clip};
-    rig = MakeLegRig(library.skeleton, library.stand_pose,
-                     LearnKneeHinges(library.skeleton, library.stand_pose, clips));
-    for (std::size_t f = 0; f < 2; ++f) ball_height_m[f] = rig.sides[f].ball_height_m;
+    rig = MakeLegRig(library.skeleton, library.stand_pose, {});
   }
 
   // Height of the toe tip above the ground, minus its height in the stand pose.
@@ -49,32 +45,43 @@ struct StiffToes {
     EvaluateLeg(library.skeleton, rig, pose, foot, leg);
     return pose.root_position_m.y + leg.toe_tip_m.y - rig.side(foot).toe_height_m;
   }
-  [[nodiscard]] double LowestTip() const {
-    double lowest_m = HUGE_VAL;
-    for (const RawGroup& group : library.groups) {
-      const Clip& clip = group.examples.front().clip;
-      for (int i = 0; i < clip.frame_count(); ++i) {
-        for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-          lowest_m = std::min(lowest_m, TipAbove(clip.frame(i), foot));
-        }
-      }
-    }
-    return lowest_m;
-  }
 };
 
 TEST(BendToes, TipsThatSinkWhenTheFootPushesOffStayOnTheGround) {
-  StiffToes steps;
-  ASSERT_LT(steps.LowestTip(), -0.015);
-  const Clip before = steps.library.groups[0].examples[0].clip;
-  BendToes(steps.rig, steps.ball_height_m, steps.library);
-  EXPECT_GT(steps.LowestTip(), -kMaxToeSinkM - 0.002);
-  const Clip& after = steps.library.groups[0].examples[0].clip;
-  for (int i = 0; i < after.frame_count(); ++i) {
-    EXPECT_EQ(after.frame(i).root_position_m, before.frame(i).root_position_m);
-    for (std::size_t j = 0; j < builtin::kFigureJointCount; ++j) {
-      if (std::ranges::find(kToes, j) != kToes.end()) continue;
-      EXPECT_EQ(after.frame(i).rotations[j], before.frame(i).rotations[j]) << i << ' ' << j;
+  const StiffToes steps;
+  const GridLayout layout(builtin::kFigureJointCount);
+  const ToeBender bender(steps.library);
+  const auto pose_at = [&](const GridExample& example, std::size_t at) {
+    const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+    return PoseOfRow(std::span(example.rows).subspan(at, row_floats), layout, layout.joint_count);
+  };
+  const auto lowest_tip_m = [&](const GridExample& example) {
+    double lowest_m = HUGE_VAL;
+    for (std::size_t at = 0; at < example.rows.size(); at += layout.row_floats) {
+      const Pose pose = pose_at(example, at);
+      for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+        lowest_m = std::min(lowest_m, steps.TipAbove(pose, foot));
+      }
+    }
+    return lowest_m;
+  };
+  for (const RawGroup& group : steps.library.groups) {
+    const RawExample& step = group.examples.front();
+    const std::vector<int> cells = CellsAtRate({step.keytimes_s}, 60.0);
+    const GridExample before =
+        ResampleOnGrid(step, cells, layout, steps.library.stand_pose.rotations[0]);
+    ASSERT_LT(lowest_tip_m(before), -0.015);
+    GridExample after = before;
+    bender.Bend(group.kind, cells, layout, after);
+    EXPECT_GT(lowest_tip_m(after), -kMaxToeSinkM - 1e-4);
+    for (std::size_t at = 0; at < after.rows.size(); at += layout.row_floats) {
+      const Pose then = pose_at(before, at);
+      const Pose now = pose_at(after, at);
+      EXPECT_EQ(now.root_position_m, then.root_position_m);
+      for (std::size_t j = 0; j < builtin::kFigureJointCount; ++j) {
+        if (std::ranges::find(kToes, j) != kToes.end()) continue;
+        EXPECT_EQ(now.rotations[j], then.rotations[j]) << at << ' ' << j;
+      }
     }
   }
 }
