@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "base/check.h"
+#include "base/trig.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/grid_blend.h"
 #include "runtime/pose/plant_feet.h"
@@ -127,7 +128,8 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
     Fill(lanes.base_m + c * kBlock, movement.base.position_m[static_cast<int>(c)]);
   }
   Fill(lanes.heading_rad, movement.base.heading_rad);
-  kernels::SinCos(lanes.heading_rad, times_s.size(), lanes.sine, lanes.cosine);
+  Fill(lanes.sine, Sin(movement.base.heading_rad));
+  Fill(lanes.cosine, Cos(movement.base.heading_rad));
   Fill(lanes.extra_turn_rad, movement.extra_turn_rad);
   const kernels::FinishPosesJob blend = {
       .rows = rows.data(),
