@@ -281,7 +281,7 @@ bool WorldView::Continue(Track& track, std::uint16_t shard, const PoseStamp& sta
   if (continued.ticks != ticks_ || continued.last + 1 != last ||
       ticks_->at(last).tick != stamp.tick ||
       ticks_->count - continued.first >= ticks_->ring.size() ||
-      continued.movement->number != replica.movement_number() || !HasMovementOnly(replica) ||
+      continued.number != replica.movement_number() || !HasMovementOnly(replica) ||
       continued.standing != stamp.standing || stamp.discontinuity || track.epoch != epoch_) {
     return false;
   }
@@ -305,6 +305,7 @@ void WorldView::BeginContinuing(Track& track, double time_s) {
                      .ticks = &ticks,
                      .first = ticks.count - 1,
                      .last = ticks.count - 1,
+                     .number = movement->number,
                      .standing = stamp.standing};
 }
 
@@ -477,7 +478,12 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
   };
   for (auto& [shard, ticks] : shard_ticks_) ticks.FindSample(time_s);
   sampled_tracks_.clear();
+  constexpr std::size_t kPrefetched = 4;  // Movements are prefetched at this distance.
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
+    if (i + kPrefetched < tracks_.size()) {
+      const PlayedMovement* later = tracks_[i + kPrefetched].continued.movement;
+      if (later != nullptr) SoaPoseEvaluator::PrefetchTimes(later->movement);
+    }
     const std::size_t pose = sampled_tracks_.size();
     if (const Continued& continued = tracks_[i].continued; IsSampled(continued)) {
       const ShardTicks& ticks = *continued.ticks;

@@ -172,8 +172,9 @@ class WorldView : public PoseSink {
     const PlayedMovement* movement = nullptr;  ///< Null: the history contains all poses.
     double first_s = 0.0;                      ///< Time of the movement at `first`.
     const ShardTicks* ticks = nullptr;
-    std::uint64_t first = 0;  ///< Number of the newest tick in the history.
-    std::uint64_t last = 0;   ///< Number of the newest tick.
+    std::uint64_t first = 0;   ///< Number of the newest tick in the history.
+    std::uint64_t last = 0;    ///< Number of the newest tick.
+    std::uint32_t number = 0;  ///< PlayedMovement::number, which is not in the cache.
     bool standing = false;
   };
   struct Track {
