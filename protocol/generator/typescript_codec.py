@@ -98,8 +98,8 @@ class TypeScriptCodec(TypeScript):
             result = self.type_of(self.only_member(table))
             lines = [f"return {self.read(table.fields[0])};"]
         elif "web" in table:
-            result = "[ParameterName, number]"
-            lines = ["return [parameterNames[w.name()]!, w.value()];"]
+            result = "[string, number]"
+            lines = ["return [enums.ParameterName[w.name()]!, w.value()];"]
         elif self.is_tuple(table):
             result = f"[{', '.join(['number'] * len(table.fields))}]"
             lines = [f"return [{', '.join(f'w.{f.name}()' for f in table.fields)}];"]
@@ -279,9 +279,8 @@ class TypeScriptCodec(TypeScript):
         builders = "".join(f"  {m.name}: build{m.name},\n" for m in self.schema.messages)
         return (self.head() +
                 "import {Builder, ByteBuffer, Encoding} from 'flatbuffers';\n"
-                "import type {ParameterName} from '../src/types';\n"
                 "import * as check from '../src/wire/check';\n"
-                "import {parameterList, parameterNames} from '../src/wire/parameters';\n"
+                "import {parameterList} from '../src/wire/parameters';\n"
                 "import {absent, structs, text, zeros} from '../src/wire/support';\n"
                 f"import {{enums, type {names.replace(', ', ', type ')}}} from './messages';\n"
                 "import * as wire from './wire';\n\n" + "\n".join(filter(None, functions)) +

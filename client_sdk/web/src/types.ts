@@ -8,12 +8,12 @@
  */
 import type * as messages from '../generated/messages';
 import type {
-  EndSite, Foot, Leg, MovementType, RequestItem, Role, Terrain
+  EndSite, Foot, Leg, MovementType, ParameterName, RequestItem, Role, Terrain
 } from '../generated/messages';
 
 export type {
   EndSite, EventType as WorldEventType, Foot, HeightField, Interrupt, Landing, Leg, MovementKind,
-  MovementType, PlayingLayer, RequestOutcome, Role, Terrain, TerrainBox
+  MovementType, ParameterName, PlayingLayer, RequestOutcome, Role, Terrain, TerrainBox
 } from '../generated/messages';
 /**
  * Precision of received poses.
@@ -36,8 +36,6 @@ export type PoseMode = 'full' | 'quantised' | 'movement';
  * joint.
  */
 export type PoseDetail = 'all' | 'reduced' | 'root';
-export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | 'endZ' | 'turn' |
-    'length' | 'height';
 /**
  * State of a world.
  * - `pending`: the client will join the world as soon as it is connected.
@@ -92,7 +90,8 @@ export type SpawnItem = Optional<messages.SpawnItem, 'avatar' | 'teleport'>;
 
 /**
  * Starts, changes or ends a layer: a clip of the motion library that is blended over an avatar's
- * movements, for example waving. Layers do not change the legs and the root.
+ * movements, for example waving. Layers do not change the legs and the root. By default, `enabled`
+ * is true, `weight` and `speed` are 1, and `blendS` is 0.3.
  */
 export type LayerRequest =
     Optional<messages.LayerItem, 'enabled' | 'weight' | 'blendS' | 'speed'>;

@@ -1,6 +1,5 @@
 import type {AvatarState, WorldEvent} from '../types';
-import type {AvatarState as AvatarStateMessage, Event} from '../../generated/messages';
-import {parameterNames} from './parameters';
+import {enums, type AvatarState as AvatarStateMessage, type Event} from '../../generated/messages';
 
 /** Functions that convert messages to those public types that differ from the schema. */
 
@@ -18,7 +17,7 @@ export function avatarStateOf(message: AvatarStateMessage): AvatarState {
     movement: movement && {
       ...movement,
       endTimeS: movement.startTimeS + (movement.keytimesS.at(-1) ?? 0),
-      parameterNames: Array.from(movement.parameterNames, (name) => parameterNames[name]!),
+      parameterNames: Array.from(movement.parameterNames, (name) => enums.ParameterName[name]!),
     },
   };
 }
