@@ -110,7 +110,10 @@ void Session::AdvanceTime(double now_s) {
       }
       break;
     case State::kReady:
-      std::erase_if(inspections_, [&](const auto& entry) { return now_s >= entry.second; });
+      // All inspections have the same timeout, so the oldest one expires first.
+      while (!inspections_.empty() && now_s >= inspections_.begin()->second) {
+        EndInspection(inspections_.begin()->first, STRIDEWIRE_TIMEOUT);
+      }
       if (limits_.idle_timeout_s > 0.0 && now_s - heard_s_ > limits_.idle_timeout_s) {
         LoseConnection(STRIDEWIRE_TIMEOUT, "the server sent nothing for too long", now_s);
       } else if (now_s >= next_ping_s_) {
@@ -194,10 +197,16 @@ void Session::LoseConnection(stridewire_status status, std::string_view text, do
   ScheduleAttempt(was_ready, status == STRIDEWIRE_SHUTTING_DOWN, now_s);
   output_.clear();
   pending_pings_.clear();
-  inspections_.clear();
+  EndInspections();
   events_.Push(
       MakeEvent(was_ready ? STRIDEWIRE_EVENT_CONNECTION_LOST : STRIDEWIRE_EVENT_CONNECT_FAILED, 0,
                 status, last_text_));
+}
+
+void Session::EndInspections() {
+  while (!inspections_.empty()) {
+    EndInspection(inspections_.begin()->first, STRIDEWIRE_CONNECTION_LOST);
+  }
 }
 
 void Session::ScheduleAttempt(bool was_ready, bool server_leaves, double now_s) {
@@ -245,7 +254,7 @@ void Session::Reset() {
   playout_.Reset();
   rtts_s_.clear();
   pending_pings_.clear();
-  inspections_.clear();
+  EndInspections();
   output_.clear();
 }
 

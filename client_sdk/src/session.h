@@ -45,8 +45,8 @@ class Session : public SessionCommands {
   /// Same as OnBytes for transports that keep frames apart, such as WebSocket. `frame` must be one
   /// complete frame and begin on a multiple of 8 bytes.
   void OnFrame(std::span<const std::byte> frame, double now_s);
-  /// Returns the command of the application that the frame of the last OnFrame answered. Returns 0
-  /// if the frame was no Reply, or a Reply to a command of the session itself.
+  /// Returns the command or inspection of the application that the frame of the last OnFrame
+  /// answered. Returns 0 for other frames, and for a Reply to a command of the session itself.
   [[nodiscard]] std::uint64_t answered_command() const { return answered_command_; }
   /// Must be called when the attempt to connect has failed or the connection was lost.
   void OnLost(stridewire_status status, std::string_view text, double now_s);
@@ -99,6 +99,8 @@ class Session : public SessionCommands {
   void RestoreSession();
   void Reset();
   void LoseConnection(stridewire_status status, std::string_view text, double now_s);
+  /// Ends all inspections, because the connection is lost.
+  void EndInspections();
   /// Chooses the address and the time of the next attempt to connect.
   void ScheduleAttempt(bool was_ready, bool server_leaves, double now_s);
   /// Returns the text of the current address. Returns an empty string if there is no address.

@@ -207,7 +207,7 @@ stridewire_status SessionCommands::Inspect(stridewire_world world, protocol::Ava
   if (inspections_.size() >= kMaxInspections) {
     return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many inspections are unanswered");
   }
-  const protocol::InspectAvatar query{++inspection_nonce_, found->second.server_id, avatar};
+  const protocol::InspectAvatar query{next_command_++, found->second.server_id, avatar};
   if (Status status = encoder_.Encode(query, output_); !status) {
     return Refuse(ToStatus(status.error().code), Describe(status.error()));
   }

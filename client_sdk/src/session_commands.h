@@ -36,8 +36,9 @@ class SessionCommands : public SessionState {
                                std::uint64_t& command);
   stridewire_status StopObserving(std::uint32_t subscription, std::uint64_t& command);
 
-  /// Queries the state of an avatar. The answer is an AvatarState message with `nonce`. There is no
-  /// answer if the connection is lost or kInspectTimeoutS passes. Fails with NOT_READY if the world
+  /// Queries the state of an avatar. The event REPLY with the command `nonce` reports the result.
+  /// If it is OK, the application reads the AvatarState message. The result is CONNECTION_LOST if
+  /// the connection is lost, and TIMEOUT after kInspectTimeoutS. Fails with NOT_READY if the world
   /// is not joined, and with COMMANDS_FULL if there are more than kMaxInspections unanswered
   /// queries.
   stridewire_status Inspect(stridewire_world world, protocol::AvatarId avatar,

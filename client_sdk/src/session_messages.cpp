@@ -402,7 +402,8 @@ void Session::Handle(const protocol::AvatarState& message, double now_s) {
     return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent AvatarState before Welcome",
                           now_s);
   }
-  inspections_.erase(message.nonce);  // The application reads the message itself.
+  if (inspections_.contains(message.nonce)) answered_command_ = message.nonce;
+  EndInspection(message.nonce, ToStatus(message.code), message.text);
 }
 
 void Session::Handle(const protocol::LibraryPiece& message, double now_s) {

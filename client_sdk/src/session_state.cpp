@@ -197,4 +197,12 @@ stridewire_event SessionState::MakeEvent(stridewire_event_type type, stridewire_
   return event;
 }
 
+void SessionState::EndInspection(std::uint64_t nonce, stridewire_status status,
+                                 std::string_view text) {
+  if (inspections_.erase(nonce) == 0) return;
+  stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_REPLY, 0, status, text);
+  event.command = nonce;
+  events_.Push(event);
+}
+
 }  // namespace stridewire::client

@@ -155,6 +155,9 @@ class SessionState {
                                            stridewire_status status = STRIDEWIRE_OK,
                                            std::string_view text = {}) const;
 
+  /// Reports the result of an inspection with the event REPLY, and forgets the inspection.
+  void EndInspection(std::uint64_t nonce, stridewire_status status, std::string_view text = {});
+
   SessionOptions options_;
   State state_ = State::kIdle;
   stridewire_status last_status_ = STRIDEWIRE_OK;
@@ -201,7 +204,6 @@ class SessionState {
   std::set<std::uint64_t> pending_pings_;
   /// Unanswered inspections: nonce and time at which the inspection expires.
   std::map<std::uint64_t, double> inspections_;
-  std::uint64_t inspection_nonce_ = 0;
   std::optional<protocol::FrameReader> reader_;
   protocol::Encoder encoder_;
   std::vector<std::byte> output_;

@@ -8,9 +8,7 @@ import {Status, statusText} from './status';
 import type {
   AvatarState, Observation, Region, Reply, Role, Subscription, WorldState
 } from './types';
-import {
-  MessageType, type Events, type Message, type Reply as ReplyMessage
-} from '../generated/messages';
+import {MessageType, type Events, type Message} from '../generated/messages';
 import {NativeEvent, readStatistics} from '../generated/native';
 import * as commands from './wire/commands';
 import {avatarStateOf, eventOf} from './wire/convert';
@@ -19,7 +17,6 @@ import {
 } from './wire/frame';
 import {WorldHandle, type ActiveSubscription} from './world';
 
-const inspectTimeoutS = 10;
 const cacheTimeoutS = 5;
 
 /** States of the module, in the order of their numbers. */
@@ -27,18 +24,14 @@ const states: readonly ClientState[] =
     ['idle', 'waiting', 'connecting', 'handshake', 'ready', 'closing', 'closed'];
 const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
 /** Messages with contents that the module leaves to this class. */
-const userMessages: readonly number[] =
-    [MessageType.WorldInfo, MessageType.Events, MessageType.AvatarState];
+const userMessages: readonly number[] = [MessageType.WorldInfo, MessageType.Events];
 /** Results of `state`. */
 const networkNames = [
   'nextTimeS', 'connectDue', 'needsSocket', 'connectionNumber', 'outputBytes', 'addressIndex',
 ] as const;
 
-interface Inspection {
-  readonly resolve: (state: AvatarState) => void;
-  readonly reject: (error: StridewireError) => void;
-  readonly deadlineS: number;
-}
+/** Called with the reply to a command or inspection, and with the message that describes it. */
+type Answer = (reply: Reply, message?: Message) => void;
 
 /**
  * The web client's view of a session of the C++ client, which runs in the WebAssembly module
@@ -64,14 +57,11 @@ export class Session {
   private nextSubscription = 1;
   /** The next id for a request without an id. */
   nextRequestId = 1n;
-  /** Functions to call with the replies to commands, by the number of the command. */
-  private readonly pending = new Map<number, (reply: Reply) => void>();
-  private readonly inspections = new Map<bigint, Inspection>();
+  /** Unanswered commands and inspections, by their numbers. */
+  private readonly pending = new Map<number, Answer>();
   private lastEventsNumber = 0n;
-  private connection = 0;
   /** The command that the last frame has answered, or 0. */
   private answered = 0;
-  private nowS = 0;
 
   private readonly notifications: (() => void)[] = [];
   private notifying = false;
@@ -212,13 +202,15 @@ export class Session {
 
   inspect(world: WorldHandle, avatar: number): Promise<AvatarState> {
     return new Promise((resolve, reject) => this.run(() => {
+      const answer: Answer = ({ok, code, text}, message) => {
+        if (ok && message?.type === 'AvatarState') resolve(avatarStateOf(message));
+        else reject(new StridewireError(code, text));
+      };
       try {
         const results = this.call(world, {type: 'InspectAvatar', nonce: 0n, avatar});
-        this.inspections.set(BigInt(results[0]!),
-                             {resolve, reject, deadlineS: this.nowS + inspectTimeoutS});
+        this.pending.set(results[0]!, answer);
       } catch (error) {
-        const {code, text} = refusal(error);
-        reject(new StridewireError(code, text));
+        answer(refusal(error));
       }
     }));
   }
@@ -269,7 +261,6 @@ export class Session {
   /** Processes a received frame. Never throws, whatever the frame contains. */
   onFrame(frame: ArrayBuffer, nowS: number): void {
     if (this.state !== 'handshake' && this.state !== 'ready') return;
-    this.nowS = nowS;
     ++this.total.framesReceived;
     const type = typeOfFrame(frame);
     const hasPoses = type === MessageType.PoseBatch || type === MessageType.Movements;
@@ -299,15 +290,7 @@ export class Session {
 
   /** Handles timeouts and sends pings. */
   advanceTime(nowS: number): void {
-    this.nowS = nowS;
-    this.run(() => {
-      for (const [nonce, inspection] of this.inspections) {
-        if (nowS < inspection.deadlineS) continue;
-        this.inspections.delete(nonce);
-        this.later(() => inspection.reject(new StridewireError(Status.timeout, '')));
-      }
-      native().call.advance(this.client, nowS);
-    });
+    this.run(() => native().call.advance(this.client, nowS));
   }
 
   /** Returns the frames to send and removes them from the output. */
@@ -505,12 +488,12 @@ export class Session {
           break;
         case NativeEvent.reply: {
           // A frame can cause replies to several commands, but describes only one of them.
-          const reply = frame !== undefined && command === this.answered
-              ? read() as ReplyMessage : undefined;
+          const message = frame !== undefined && command === this.answered ? read() : undefined;
           const answer = this.pending.get(command);
           this.pending.delete(command);
-          const result = makeReply(status, reply?.text ?? webNames(text), reply);
-          this.later(() => answer?.(result));
+          const why = message !== undefined && 'text' in message ? message.text : webNames(text);
+          const result = makeReply(status, why, message?.type === 'Reply' ? message : undefined);
+          this.later(() => answer?.(result, message));
           break;
         }
         case NativeEvent.item:
@@ -545,12 +528,6 @@ export class Session {
       if (world === undefined) return;
       world.setInfo(message);
       this.later(() => world.listeners.emit('state', world.state));
-    } else if (message.type === 'AvatarState') {
-      const {nonce, code, text} = message;
-      const inspection = this.inspections.get(nonce);
-      this.inspections.delete(nonce);
-      this.later(() => code === Status.ok ? inspection?.resolve(avatarStateOf(message))
-                                          : inspection?.reject(new StridewireError(code, text)));
     }
   }
 
@@ -609,14 +586,6 @@ export class Session {
   /** Reports changes of states and of lists of avatars. */
   private synchronise(): void {
     const state = states[native().call.state(this.client, 0)]!;
-    const connection = native().results[3]!;
-    if (connection !== this.connection || (state !== 'ready' && this.inspections.size > 0)) {
-      this.connection = connection;
-      for (const {reject} of this.inspections.values()) {
-        this.later(() => reject(new StridewireError(Status.connection_lost, '')));
-      }
-      this.inspections.clear();
-    }
     if (state !== this.state) {
       this.state = state;
       this.later(() => this.listeners.emit('state', state));

@@ -299,7 +299,7 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.auth_token = hello.auth_token;
   options.max_commands = static_cast<std::size_t>(numbers[0]);
   // When a session ends, each command adds a reply in one call, and no reply may be lost.
-  options.max_events += options.max_commands;
+  options.max_events += options.max_commands + Session::kMaxInspections;
   options.pose_history = static_cast<std::size_t>(numbers[1]);
   // An address has 32 bits here.
   constexpr double kMaxBytes = 4294967295.0;
