@@ -2,12 +2,12 @@
 """Draws two BVH files of the same choreography, one above the other.
 
 Both are drawn as strips of poses (left side orange, right side blue) or as a curve over time: the
-angle of the right knee, or the height, speed or sideways position of the pelvis. Writes SVG with
-gnuplot and needs only Python's standard library.
+angle of the right knee, or the height, speed, sideways position, heading or distance to the last
+place of the pelvis. Writes SVG with gnuplot and needs only Python's standard library.
 
     draw_before_after.py BEFORE.bvh AFTER.bvh OUT.svg --title TEXT
-                         [--curve knee|height|speed|sway] [--every 0.25] [--from 0] [--to 60]
-                         [--ground Z,Y,Z,Y,...]
+                         [--curve knee|height|speed|sway|heading|distance] [--every 0.25] [--from 0]
+                         [--to 60] [--ground Z,Y,Z,Y,...]
 """
 import argparse
 import math
@@ -18,7 +18,8 @@ from draw_walk import place, read_bvh
 
 LEFT, RIGHT, MIDDLE = "#d55e00", "#0072b2", "#555555"
 CURVES = {"knee": "right knee, degrees", "height": "pelvis above its mean, cm",
-          "speed": "pelvis speed, m/s", "sway": "pelvis sideways, mm"}
+          "speed": "pelvis speed, m/s", "sway": "pelvis sideways, mm",
+          "heading": "heading of the hips, degrees", "distance": "pelvis to its last place, m"}
 
 
 def side(name):
@@ -65,11 +66,29 @@ class Recording:
         elif kind == "sway":
             mean = sum(frame[0][0] for frame in self.frames) / len(self.frames)
             values = [1000.0 * (frame[0][0] - mean) for frame in self.frames]
+        elif kind == "heading":
+            values = self.headings_deg()
+        elif kind == "distance":
+            last = self.frames[-1][0]
+            values = [math.hypot(frame[0][0] - last[0], frame[0][2] - last[2])
+                      for frame in self.frames]
         else:
             values = [math.hypot(b[0][0] - a[0][0], b[0][2] - a[0][2]) / self.step_s
                       for a, b in zip(self.frames, self.frames[1:])]
         return "\n".join(f"{(self.first + f) * self.step_s:.3f} {v:.3f}"
                          for f, v in enumerate(values))
+
+    def headings_deg(self):
+        """Returns the heading of the line between the hips, without jumps at half-turns."""
+        left, right = self.index["LeftUpLeg"], self.index["RightUpLeg"]
+        headings = []
+        for frame in self.frames:
+            across = [frame[left][k] - frame[right][k] for k in range(3)]
+            heading = math.degrees(math.atan2(-across[2], across[0]))
+            if headings:
+                heading += 360.0 * round((headings[-1] - heading) / 360.0)
+            headings.append(heading)
+        return headings
 
     def extent(self):
         along = [p[2] for frame in self.frames for p in frame]
@@ -111,7 +130,7 @@ def draw_curves(recordings, options):
     script.append(f"""
 set terminal svg noenhanced size 1000,320 font 'sans-serif,13' background '#ffffff'
 set output '{options.svg}'
-set title "{options.title}"; set key top right horizontal; set border 3; set tics nomirror
+set title "{options.title}"; set key outside top right horizontal; set border 3; set tics nomirror
 set xlabel 's'; set ylabel '{CURVES[options.curve]}'
 plot $b w l lc rgb '#999999' lw 1.5 t 'before', $a w l lc rgb '{RIGHT}' lw 1.5 t 'after'
 """)

@@ -41,6 +41,10 @@ echo "{\"movements\": [$(repeat 4 0.6), {\"stand\": {\"seconds\": 1}}]}" >"$work
 echo '{"movements": [{"stand": {"seconds": 8}}]}' >"$work/stand.json"
 echo '{"movements": [{"walk_to": {"position_m": [0, 0, 3.5], "heading_rad": 0}}]}' \
   >"$work/goal.json"
+echo "{\"movements\": [$(repeat 4 0.6),
+  {\"walk_to\": {\"position_m\": [0, 0, -3], \"heading_rad\": 3.1416}}]}" >"$work/behind.json"
+echo '{"movements": [{"walk_to": {"position_m": [3.5, 0, 0], "heading_rad": 0}}]}' \
+  >"$work/side.json"
 
 # The profile of the terrain in flight.json: places and heights.
 profile=0,0,1,0,1,0.17,1.3,0.17,1.3,0.34,1.6,0.34,1.6,0.51,2.8,0.51,2.8,0.34
@@ -55,3 +59,9 @@ draw back 16 "$work/back.json" "six steps of -0.3 m, captures of CMU 16"
 draw pelvis builtin "$work/level.json" "steps of 0.6 m, generated library" --curve height
 draw level_knee builtin "$work/level.json" "steps of 0.6 m, generated library" --curve knee
 draw level_knee 16 "$work/level.json" "steps of 0.6 m, captures of CMU 16" --curve knee
+draw turn_heading builtin "$work/behind.json" "four steps, then walk_to 3 m behind, generated library" \
+  --curve heading
+draw turn_heading 16 "$work/behind.json" "four steps, then walk_to 3 m behind, captures of CMU 16" \
+  --curve heading
+draw side_distance 16 "$work/side.json" "walk_to 3.5 m to the left, captures of CMU 16" \
+  --curve distance
