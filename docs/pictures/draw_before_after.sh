@@ -59,9 +59,8 @@ draw back 16 "$work/back.json" "six steps of -0.3 m, captures of CMU 16"
 draw pelvis builtin "$work/level.json" "steps of 0.6 m, generated library" --curve height
 draw level_knee builtin "$work/level.json" "steps of 0.6 m, generated library" --curve knee
 draw level_knee 16 "$work/level.json" "steps of 0.6 m, captures of CMU 16" --curve knee
-draw turn_heading builtin "$work/behind.json" "four steps, then walk_to 3 m behind, generated library" \
-  --curve heading
-draw turn_heading 16 "$work/behind.json" "four steps, then walk_to 3 m behind, captures of CMU 16" \
-  --curve heading
+back="four steps, then walk_to 3 m behind"
+draw turn_heading builtin "$work/behind.json" "$back, generated library" --curve heading
+draw turn_heading 16 "$work/behind.json" "$back, captures of CMU 16" --curve heading
 draw side_distance 16 "$work/side.json" "walk_to 3.5 m to the left, captures of CMU 16" \
   --curve distance
