@@ -1,5 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
 namespace stridewire::builtin {
 
 /// Sideways detours that a swinging foot may take around the other foot.
@@ -9,12 +13,14 @@ struct DetourRange {
   double clearance_m = 0.0;  ///< Minimum distance between the feet at which they do not touch.
 };
 
+/// Detours do not become longer to increase the distance between the feet by less than this.
+inline constexpr double kSmallestGainM = 1e-3;
+
 /// Returns the smallest detour at which the feet stay `clearance_m` apart. If there is none,
 /// returns the detour at which they stay farthest apart. `nearest_m` returns the smallest distance
 /// between the feet for a detour.
 template <class NearestM>
 [[nodiscard]] double FindDetour(const DetourRange& range, const NearestM& nearest_m) {
-  constexpr double kSmallestGainM = 1e-3;
   double best_m = 0.0;
   double widest_m = 0.0;
   for (double detour_m = 0.0; detour_m < range.max_m; detour_m += range.step_m) {
@@ -27,6 +33,32 @@ template <class NearestM>
     if (widest_m >= range.clearance_m) break;
   }
   return best_m;
+}
+
+/// Returns the smallest detour at which the feet stay `clearance_m` apart, or as far as possible,
+/// less kSmallestGainM. In contrast to FindDetour, the result is not a multiple of `step_m`, and
+/// rounding errors of distances hardly change it.
+template <class NearestM>
+[[nodiscard]] double FindExactDetour(const DetourRange& range, const NearestM& nearest_m) {
+  constexpr int kBisections = 14;
+  std::vector<double> distances_m;
+  double widest_m = 0.0;
+  for (double detour_m = 0.0; detour_m < range.max_m && widest_m < range.clearance_m;
+       detour_m += range.step_m) {
+    distances_m.push_back(nearest_m(detour_m));
+    widest_m = std::max(widest_m, distances_m.back());
+  }
+  const double enough_m = std::min(widest_m, range.clearance_m) - kSmallestGainM;
+  std::size_t first = 0;
+  while (distances_m[first] < enough_m) ++first;
+  if (first == 0) return 0.0;
+  double longer_m = static_cast<double>(first) * range.step_m;
+  double shorter_m = longer_m - range.step_m;
+  for (int i = 0; i < kBisections; ++i) {
+    const double middle_m = 0.5 * (shorter_m + longer_m);
+    (nearest_m(middle_m) < enough_m ? shorter_m : longer_m) = middle_m;
+  }
+  return longer_m;
 }
 
 }  // namespace stridewire::builtin

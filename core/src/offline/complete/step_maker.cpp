@@ -49,11 +49,10 @@ constexpr double kSwingRounding = 0.02;
 // Minimum weight of the captured stride in the middle of a swing, for the rotation and the height
 // of the foot. It prevents feet from dragging along the ground in short steps.
 constexpr double kMinSwingShare = 0.45;
-// Minimum heights of the ball and of the toe tip during a swing. The foot is lifted in increments
-// of kLiftStepM until it reaches them.
-constexpr double kClearanceM = 0.024;
-constexpr double kTipClearanceM = 0.02;
-constexpr double kLiftStepM = 0.004;
+// Minimum heights of the ball and of the toe tip during a swing. The foot is lifted by up to
+// kMaxLiftM to reach them.
+constexpr double kClearanceM = 0.026;
+constexpr double kTipClearanceM = 0.022;
 constexpr double kMaxLiftM = 0.12;
 constexpr builtin::DetourRange kDetours = {.max_m = 0.35, .step_m = 0.01, .clearance_m = 0.09};
 
@@ -443,27 +442,23 @@ class StepGenerator {
   }
 
   // Plans the detour and the lift of the swinging foot. If the step turns, the foot moves around
-  // the fixed one. The lift grows until the foot clears the ground, up to kMaxLiftM.
+  // the fixed one. The lift is the smallest one at which the foot clears the ground. Both depend
+  // continuously on the captures. Otherwise, rounding errors could change steps visibly.
   void PlanSwing() {
     if (feet_.turn_rad != 0.0) PlanDetour();
     const LegRig::Side& side = person_.rig.side(moving_);
     const double ball_y = person_.stand.balls_m[Index(moving_)].y;
-    struct Check {
-      FootState foot;
-      double ball_m;  // Minimum height of the ball.
-      double tip_m;   // Minimum height of the toe tip.
-    };
-    std::vector<Check> checks;
+    double lift_m = 0.0;
     for (int i = 4; i <= 17; ++i) {
       const double part = 0.05 * i;
       const bool is_early = part < 0.3;
-      checks.push_back({FootInSwing(moving_, part), ball_y + (is_early ? 0.0 : kClearanceM),
-                        side.toe_height_m + (is_early ? 0.0 : kTipClearanceM)});
+      const FootState foot = FootInSwing(moving_, part);
+      const double ball_m = ball_y + (is_early ? 0.0 : kClearanceM) - BallOf(foot).y;
+      const double tip_m =
+          side.toe_height_m + (is_early ? 0.0 : kTipClearanceM) - TargetOf(foot).tip_m.y;
+      lift_m = std::max(lift_m, std::max(ball_m, tip_m) / foot.swing);
     }
-    const auto is_clear = [&](const Check& check) {
-      return BallOf(check.foot).y >= check.ball_m && TargetOf(check.foot).tip_m.y >= check.tip_m;
-    };
-    while (!std::ranges::all_of(checks, is_clear) && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
+    lift_m_ = std::min(lift_m, kMaxLiftM);
   }
 
   void PlanDetour() {
@@ -471,7 +466,7 @@ class StepGenerator {
     for (int i = 1; i < 10; ++i) {
       feet.emplace_back(FootInSwing(moving_, 0.1 * i), FootInSwing(fixed_, 0.1 * i));
     }
-    detour_m_ = builtin::FindDetour(kDetours, [&](double detour_m) {
+    detour_m_ = builtin::FindExactDetour(kDetours, [&](double detour_m) {
       detour_m_ = detour_m;
       double nearest = kDetours.max_m;
       for (const auto& [swinging, still] : feet) {

@@ -9,6 +9,7 @@
 #include "offline/build/bend_toes.h"
 #include "offline/builtin/figure.h"
 #include "offline/builtin/step.h"
+#include "offline/builtin/swing_detour.h"
 #include "offline/complete/generic_stride.h"
 #include "runtime/library/knee_hinges.h"
 #include "runtime/skeleton/foot_vector.h"
@@ -94,6 +95,24 @@ TEST(StepMaker, ToesBendWhereTheirTipsWouldSink) {
             << length_m << ' ' << i;
       }
     }
+  }
+}
+
+// Rounding errors of the distances must not change the detour by a whole increment.
+TEST(FindExactDetour, DependsContinuouslyOnTheDistances) {
+  const builtin::DetourRange range = {.max_m = 0.35, .step_m = 0.01, .clearance_m = 0.09};
+  const auto detour_m = [&](double at_zero_m, double most_m) {
+    return builtin::FindExactDetour(
+        range, [&](double tried_m) { return std::min(at_zero_m + 0.5 * tried_m, most_m); });
+  };
+  const double enough_m = range.clearance_m - builtin::kSmallestGainM;
+  for (const double error_m : {-1e-6, 0.0, 1e-6}) {
+    // The clearance is reached after 0.06 m, exactly after six increments.
+    EXPECT_NEAR(detour_m(0.06 + error_m, 1.0), 2.0 * (enough_m - 0.06), 5e-6);
+    // The distance does not exceed 0.07 m, for example because of the landing.
+    EXPECT_NEAR(detour_m(0.06 + error_m, 0.07), 2.0 * (0.069 - 0.06), 5e-6);
+    EXPECT_EQ(detour_m(0.09 + error_m, 1.0), 0.0);
+    EXPECT_EQ(detour_m(0.03, 0.03 + error_m), 0.0);
   }
 }
 
