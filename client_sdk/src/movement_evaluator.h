@@ -9,15 +9,17 @@
 
 namespace stridewire::client {
 
-/// A movement of an avatar, with what connects it to the avatar's previous movement.
+/// A movement of an avatar, and data to determine whether it directly follows the previous one.
 struct PlayedMovement {
   Movement movement;
   std::uint32_t number = 0;  ///< AvatarReplica::movement_number()
-  /// AvatarReplica::previous_end_s()
+  /// AvatarReplica::previous_end_s(): the time in the previous movement at which it ended. Negative
+  /// if this movement did not begin at the end of another one.
   double previous_end_s = -1.0;
 };
 
-/// Evaluates single poses of movements, similar ones side by side.
+/// Evaluates single poses of many movements. Groups similar poses and evaluates each group with
+/// SIMD.
 class MovementEvaluator {
  public:
   explicit MovementEvaluator(std::shared_ptr<const MotionLibrary> library)

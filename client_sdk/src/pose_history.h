@@ -117,17 +117,18 @@ class PoseHistory {
   /// Describes how Sample computed a pose.
   struct Sampled {
     std::size_t index = 0;  ///< Index of the newest pose at or before the sampled time.
-    /// True if the pose was interpolated, or is exactly the received pose `index`.
+    /// True if the pose was interpolated, or evaluated from a movement between two poses, or if
+    /// `time_s` is exactly the time of pose `index`.
     bool interpolated = false;
     /// True if the pose continues the motion after the newest pose. If this and `interpolated` are
     /// both false, the pose is held: it is pose `index`, or the end of the extrapolation.
     bool extrapolated = false;
   };
 
-  /// Computes the pose at `time_s` by cubic Hermite interpolation, which is continuous in its first
-  /// derivative and exact at received poses. Rotations are interpolated in one hemisphere and
-  /// normalized. Before a discontinuity, returns the last pose unchanged. Returns nullopt for times
-  /// before the oldest pose.
+  /// Computes the pose at `time_s`: evaluates the movement if one determines the pose, otherwise
+  /// interpolates between stored poses (InterpolatePose). In the interval before a discontinuity,
+  /// returns the pose at its start, but extrapolates it if the interval is a gap. Also extrapolates
+  /// after the newest pose. Returns nullopt for times before the oldest pose.
   [[nodiscard]] std::optional<Sampled> Sample(double time_s, Vec3& root_position_m,
                                               std::span<Quat> rotations) const;
 

@@ -14,9 +14,9 @@ namespace stridewire {
 /// raised to that height, toes would hover in blends of steps whose resting toes differ.
 inline constexpr double kMaxToeSinkM = 0.005;
 
-/// If the toe tip of a foot is lower than `height_m` in the frame of the pose, bends the toes
-/// upward until it is at that height, or by 60 degrees if that is less. Does nothing if the foot
-/// has no toe joint.
+/// If the toe tip of a foot is below `height_m` (in the frame of the pose), bends the toes upward
+/// until the tip is at that height, but by at most 60 degrees. Does nothing if the foot has no toe
+/// joint or if the toes point straight up or down.
 void RaiseToeTip(const Skeleton& skeleton, const LegRig& rig, Foot foot, double height_m,
                  PoseSpan pose);
 

@@ -6,14 +6,15 @@
 
 namespace stridewire::builtin {
 
-/// Sideways detours that a swinging foot may take around the other foot.
+/// Sideways detours that a swinging foot may take around the other foot. All members must be above
+/// 0.
 struct DetourRange {
-  double max_m = 0.0;
+  double max_m = 0.0;        ///< Detours are shorter than this.
   double step_m = 0.0;       ///< Increment between successive detours that are tried.
   double clearance_m = 0.0;  ///< Minimum distance between the feet at which they do not touch.
 };
 
-/// Detours do not become longer to increase the distance between the feet by less than this.
+/// Tolerance of distances between the feet. A longer detour is not taken if it gains less.
 inline constexpr double kSmallestGainM = 1e-3;
 
 /// Returns the smallest detour at which the feet stay `clearance_m` apart. If there is none,
@@ -35,9 +36,9 @@ template <class NearestM>
   return best_m;
 }
 
-/// Returns the smallest detour at which the feet stay `clearance_m` apart, or as far as possible,
-/// less kSmallestGainM. In contrast to FindDetour, the result is not a multiple of `step_m`, and
-/// rounding errors of distances hardly change it.
+/// Same as FindDetour, but refines the result by bisection, so it need not be a multiple of
+/// `step_m`, and rounding errors of distances hardly change it. The feet may be kSmallestGainM
+/// closer than `clearance_m`, or than the largest distance found if `clearance_m` is out of reach.
 template <class NearestM>
 [[nodiscard]] double FindExactDetour(const DetourRange& range, const NearestM& nearest_m) {
   constexpr int kBisections = 14;
