@@ -5,6 +5,9 @@ import assert from 'node:assert/strict';
 import {assertNear, sharedChecks, spawnedByCard} from './controls_page.mjs';
 import {differingShare, waitFor, waitForCamera} from './support.mjs';
 
+/** The default of stridewired, which the tests use. */
+const ticksPerS = 60;
+
 /** Names of all current controls of the page: the part of the page, and the control. */
 export const controlNames = (page) => page.evaluate(() => [...document.querySelectorAll(
   'button, input, select, summary, a[href], textarea, [role=application]')].map((element) => {
@@ -397,12 +400,13 @@ function streamChecks(t) {
     }]),
     ...[[2, 'Quantised, ½ rate'], [4, 'Quantised, ¼ rate'], [1, 'Quantised']].map(
       ([interval, name]) => [`view: rate-${interval}`, async () => {
-        const all = await t.streamCost('Quantised');
         await choose(`rate-${interval}`);
-        const {bytesPerS} = await t.streamCost(name, true);
-        if (interval === 1) return;
-        assert.ok(bytesPerS < 1.4 * all.bytesPerS / interval,
-          `${bytesPerS} bytes per second, ${all.bytesPerS} at the full rate`);
+        // A page that is busy receives poses late and many at once, so single measurements vary.
+        const expected = ticksPerS / interval;
+        await waitFor(`${expected} poses per second arrive`, async () => {
+          const {bytesPerS, bytesPerPose} = await t.streamCost(name, true);
+          return Math.abs(bytesPerS / bytesPerPose / expected - 1) < 0.3;
+        });
       }]),
   ];
 }
