@@ -8,6 +8,7 @@
 #include "runtime/plan/foot_sampler.h"
 #include "runtime/plan/sole_levels.h"
 #include "runtime/plan/swing_path.h"
+#include "runtime/plan/terrain_swing.h"
 #include "runtime/plan/transition_samples.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
@@ -20,21 +21,8 @@ namespace {
 // Velocities are differences between two samples, this long before and after a time.
 constexpr double kVelocityStepS = 0.004;
 
-// Fractions of the swing at which the reach of the legs is checked.
-constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
-constexpr double kMaxRootSinkM = 0.3;
 // Largest shift of the root towards the centre between the feet.
 constexpr double kMaxCentreShiftM = 0.1;
-// A leg whose foot descends by kFullDescentM or more is extended to at most kDescentExtension of
-// its length when it lands, so that its knee is still bent. For smaller descents, the limit is
-// between kDescentExtension and kLongestExtension. Without this limit, the knee would bend abruptly
-// while the foot descends, because it was nearly straight. The limit applies after the fraction
-// kBentLanding of the swing.
-constexpr double kDescentExtension = 0.97;
-constexpr double kFullDescentM = 0.15;
-constexpr double kBentLanding = 0.85;
-constexpr double kLeastShare = 0.8;
-
 // Maximum sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
 
@@ -428,94 +416,7 @@ class Planner {
     return shift * std::min(1.0, kMaxRootShiftM / std::max(length_m, kMaxRootShiftM));
   }
 
-  // Returns by how much the root must be lower at the end of the movement, so that both legs reach
-  // their footprints. The root then descends gradually (RootSinkShare). Otherwise, planting would
-  // lower it abruptly just before the foot lands on a lower tread.
-  double RootSink(Foot moving) {
-    const FootTrajectory& trajectory = movement_.feet.foot(moving);
-    const double descent_m = trajectory.from.position_m.y - trajectory.to.position_m.y;
-    const double descent = std::clamp(descent_m / kFullDescentM, 0.0, 1.0);
-    const double bent = kLongestExtension + descent * (kDescentExtension - kLongestExtension);
-    double sink_m = 0.0;
-    for (const double part : kSinkSamples) {
-      const double time_s =
-          trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
-      const double share = RootSinkShare(time_s / movement_.duration_s());
-      sink_m = std::max(sink_m, MissingReach(time_s, moving, kLongestExtension) / share);
-      // If the foot lands long before the end of the movement, `share` is small, so the root would
-      // descend much further after the landing. For a bent knee, which is only a preference, the
-      // share counts as at least kLeastShare.
-      if (part < kBentLanding) continue;
-      sink_m = std::max(sink_m, MissingReach(time_s, moving, bent) / std::max(share, kLeastShare));
-    }
-    return std::min(sink_m, kMaxRootSinkM);
-  }
-
-  // Returns by how much planting would lower the root at this time, so that both legs reach their
-  // targets. The leg of `moving` may extend to `extension` of its length.
-  double MissingReach(double time_s, Foot moving, double extension) {
-    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
-    std::array<LegPose, 2> legs;
-    FeetAt blended;
-    for (std::size_t f = 0; f < 2; ++f) {
-      EvaluateLeg(skeleton_, rig_, pose_, static_cast<Foot>(f), legs[f]);
-      blended[f] = FootOf(rig_, static_cast<Foot>(f), DVec3(pose_.root_position_m), legs[f]);
-    }
-    const FeetCorrection corrections = CorrectFeet(movement_, time_s, blended);
-    double missing_m = 0.0;
-    for (std::size_t f = 0; f < 2; ++f) {
-      const LegRig::Side& side = rig_.sides[f];
-      const Vec3& hip = legs[f].positions_m[static_cast<std::size_t>(side.hip)];
-      const Vec3& ankle = legs[f].positions_m[static_cast<std::size_t>(side.ankle)];
-      const double length_m = static_cast<double>(side.thigh_m) + side.shank_m;
-      double allowed_m = std::clamp(static_cast<double>(glm::length(ankle - hip)),
-                                    kEasyExtension * length_m, kLongestExtension * length_m);
-      if (f == static_cast<std::size_t>(moving)) {
-        allowed_m = std::min(allowed_m, extension * length_m);
-      }
-      const DVec3 at = blended[f].ball_m + corrections.feet[f].offset_m +
-                       DVec3(TurnOf(corrections.feet[f]) * (ankle - legs[f].ball_m));
-      const DVec3 reach = at - (DVec3(pose_.root_position_m) + corrections.root_m + DVec3(hip));
-      const double drop_squared = allowed_m * allowed_m - reach.x * reach.x - reach.z * reach.z;
-      const double drop_m = std::sqrt(std::max(drop_squared, 0.25 * length_m * length_m));
-      missing_m = std::max(missing_m, -reach.y - drop_m);
-    }
-    return missing_m;
-  }
-
-  // Raises the swinging foot so that its sole clears the ground (ChooseSwing).
-  void ClearGround(Foot moving, const Terrain& terrain, FootTrajectory& trajectory) {
-    const SwingPath path = ChooseSwing(SampleSoles(moving), trajectory, terrain);
-    trajectory.lift_m = path.lift_m;
-    trajectory.mid_swing_offset_m = path.mid_swing_offset_m;
-  }
-
  private:
-  SwingSoles SampleSoles(Foot moving) {
-    const FootTrajectory& trajectory = movement_.feet.foot(moving);
-    const LegRig::Side& side = rig_.side(moving);
-    SwingSoles soles;
-    LegPose leg;
-    for (std::size_t i = 0; i < kClearanceSamples.size(); ++i) {
-      const double time_s =
-          trajectory.release_s + kClearanceSamples[i] * (trajectory.land_s - trajectory.release_s);
-      EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
-      EvaluateLeg(skeleton_, rig_, pose_, moving, leg);
-      const BlendedFoot blended = FootOf(rig_, moving, DVec3(pose_.root_position_m), leg);
-      const FootCorrection correction = CorrectFoot(movement_, moving, time_s, blended);
-      const DVec3 ball = blended.ball_m + correction.offset_m;
-      const Quat turn = TurnOf(correction);
-      const auto sole = [&](const Vec3& point, double rest_m) {
-        return ball + DVec3(turn * (point - leg.ball_m)) - DVec3(0.0, rest_m, 0.0);
-      };
-      soles.points_m[i] = {sole(leg.ball_m, side.ball_height_m),
-                           sole(leg.heel_m, side.ball_height_m),
-                           sole(leg.toe_tip_m, side.toe_height_m)};
-      soles.balls_m[i] = soles.points_m[i][0].y;
-    }
-    return soles;
-  }
-
   // Returns the value of lift `lift` (FootTrajectory::lift_m) that keeps the moving foot at least
   // `clearance_m` above level ground at these fractions of its swing. `first` is the index in
   // times_s_ of the first fraction.
@@ -676,8 +577,8 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
     const double push_m = planner.PushAside(moving);
     double root_sink_m = 0.0;
     if (target->terrain != nullptr) {
-      planner.ClearGround(moving, *target->terrain, trajectory);
-      root_sink_m = planner.RootSink(moving);
+      ClearGround(job, moving, *target->terrain);
+      root_sink_m = RootSink(job, moving);
     }
     if (push_m > 0.0) {
       trajectory.mid_swing_offset_m +=
