@@ -235,16 +235,26 @@ void Session::CloseWithError(stridewire_status status, std::string_view text) {
   if (state_ != State::kReady) ++connect_failures_;
   state_ = State::kClosed;
   FailAll(status, last_text_);
+  DetachWorlds();
   Reset();
   events_.Push(MakeEvent(STRIDEWIRE_EVENT_CLOSED, 0, status, last_text_));
 }
 
+void Session::DetachWorlds() {
+  std::erase_if(worlds_, [&](const auto& entry) {
+    const World::State state = entry.second.state;
+    return !options_.keep_worlds || state == World::State::kRefused || state == World::State::kLeft;
+  });
+  for (auto& [handle, world] : worlds_) {
+    ResetWorld(handle, world);
+    world.spawned.clear();
+    // RestoreSession creates the Observe of each subscription again.
+    for (auto& [id, subscription] : world.subscriptions) subscription.unsent = false;
+  }
+}
+
 void Session::Reset() {
   ++connection_number_;  // A socket that is still open no longer belongs to the session.
-  unanswered_.clear();
-  worlds_.clear();
-  command_count_ = 0;
-  command_bytes_ = 0;
   had_session_ = false;
   resume_token_.clear();
   next_seq_ = 1;
@@ -284,6 +294,7 @@ void Session::Close(double now_s) {
   FailAll(STRIDEWIRE_CANCELLED, "the client was disconnected");
   auto output = std::move(output_);
   const std::uint64_t connection = connection_number_;
+  DetachWorlds();
   Reset();
   state_ = State::kIdle;
   if (sends_goodbye) {

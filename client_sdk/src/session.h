@@ -98,6 +98,11 @@ class Session : public SessionCommands {
   /// subscriptions.
   void RestoreSession();
   void Reset();
+  /// Discards everything that the server has sent about a world. The world is joined again later.
+  void ResetWorld(stridewire_world handle, World& world);
+  /// Called when the session has ended, after all commands were answered. Discards the worlds, or
+  /// with SessionOptions::keep_worlds only what the server has sent about them.
+  void DetachWorlds();
   void LoseConnection(stridewire_status status, std::string_view text, double now_s);
   /// Ends all inspections, because the connection is lost.
   void EndInspections();

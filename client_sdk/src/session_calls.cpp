@@ -1,6 +1,7 @@
 // Functions of a session that the application calls. They check arguments and create commands.
 
 #include <algorithm>
+#include <type_traits>
 #include <utility>
 
 #include "session_commands.h"
@@ -32,7 +33,12 @@ stridewire_status SessionCommands::Enqueue(stridewire_world world, Message messa
   if (Status status = protocol::Check(message); !status) {
     return Refuse(ToStatus(status.error().code), Describe(status.error()));
   }
-  if (!IsOpen()) return Refuse(STRIDEWIRE_CLOSED, "the client is not connected");
+  constexpr bool kChangesWorld = std::is_same_v<Message, protocol::Observe> ||
+                                 std::is_same_v<Message, protocol::LeaveWorld> ||
+                                 std::is_same_v<Message, protocol::StopObserving>;
+  if (!IsOpen() && !(kChangesWorld && options_.keep_worlds)) {
+    return Refuse(STRIDEWIRE_CLOSED, "the client is not connected");
+  }
   const auto found = worlds_.find(world);
   if (found == worlds_.end()) return Refuse(STRIDEWIRE_NO_SUCH_WORLD, "no world has this number");
   if (found->second.state == World::State::kRefused || found->second.state == World::State::kLeft) {
@@ -55,7 +61,9 @@ stridewire_status SessionCommands::JoinWorld(std::string_view name, protocol::Ro
   if (Status status = protocol::Check(protocol::JoinWorld{1, std::string(name), role}); !status) {
     return Refuse(ToStatus(status.error().code), Describe(status.error()));
   }
-  if (!IsOpen()) return Refuse(STRIDEWIRE_CLOSED, "the client is not connected");
+  if (!IsOpen() && !options_.keep_worlds) {
+    return Refuse(STRIDEWIRE_CLOSED, "the client is not connected");
+  }
   for (auto& [handle, other] : worlds_) {
     if (other.name == name && other.state != World::State::kRefused) {
       return Refuse(STRIDEWIRE_ALREADY_JOINED, "a world of this name is already joined");
@@ -192,10 +200,28 @@ stridewire_status SessionCommands::MoveRegion(std::uint32_t subscription, protoc
       return status;
     }
     found->second.message.region = std::move(message.region);
+    if (!IsOpen()) ChangeWhileClosed(world, subscription, &found->second.message);
     Pump();
     return STRIDEWIRE_OK;
   }
   return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no region has this subscription number");
+}
+
+void SessionCommands::ChangeWhileClosed(World& world, std::uint32_t subscription,
+                                        const protocol::Observe* moved) {
+  const Command change = std::move(world.unsent.back());
+  world.unsent.pop_back();
+  const auto observe = std::ranges::find_if(world.unsent, [&](const Command& command) {
+    const auto* message = std::get_if<protocol::Observe>(&command.message);
+    return message != nullptr && message->subscription == subscription;
+  });
+  if (observe != world.unsent.end() && moved != nullptr) {
+    observe->message = *moved;
+  } else if (observe != world.unsent.end()) {
+    Answer(*observe, STRIDEWIRE_CANCELLED, "the subscription was stopped");
+    world.unsent.erase(observe);
+  }
+  Answer(change, STRIDEWIRE_OK);
 }
 
 stridewire_status SessionCommands::Inspect(stridewire_world world, protocol::AvatarId avatar,
@@ -227,6 +253,7 @@ stridewire_status SessionCommands::StopObserving(std::uint32_t subscription,
       return status;
     }
     world.subscriptions.erase(found);
+    if (!IsOpen()) ChangeWhileClosed(world, subscription, nullptr);
     if (world.subscriptions.empty()) world.view->ClearPoses();
     if (EveryNTicks(world, protocol::PoseMode::kMovement) == 0) world.replicas.reset();
     UpdateFilter(world);

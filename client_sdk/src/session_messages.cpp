@@ -126,13 +126,7 @@ void Session::RestoreSession() {
     }
     ++it;
     if (world.state == World::State::kRefused) continue;
-    world.state = World::State::kWanted;
-    world.server_id = 0;
-    world.last_dropped_batches = 0;
-    world.view->Clear();
-    world.view->Break();
-    world.replicas.reset();
-    SetTerrainOf(handle, std::nullopt);
+    ResetWorld(handle, world);
 
     std::deque<Command> first;
     for (auto& [id, subscription] : world.subscriptions) {
@@ -167,6 +161,16 @@ void Session::RestoreSession() {
     world.unsent.insert(world.unsent.begin(), std::make_move_iterator(first.begin()),
                         std::make_move_iterator(first.end()));
   }
+}
+
+void Session::ResetWorld(stridewire_world handle, World& world) {
+  world.state = World::State::kWanted;
+  world.server_id = 0;
+  world.last_dropped_batches = 0;
+  world.view->Clear();
+  world.view->Break();
+  world.replicas.reset();
+  SetTerrainOf(handle, std::nullopt);
 }
 
 void Session::Handle(const protocol::WorldInfo& message, double now_s) {

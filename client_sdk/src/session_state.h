@@ -42,6 +42,9 @@ struct SessionOptions {
   double render_delay_s = -1.0;  ///< Negative: the delay adapts to the link.
   WorldView::Evaluation evaluation = WorldView::Evaluation::kEveryTick;
   bool respawn = false;
+  /// True: worlds and subscriptions survive Close, and Open restores them in a new session. Worlds
+  /// can be joined, observed and left while the session is closed.
+  bool keep_worlds = false;
   /// True: items of replies and events of avatars become events. False: the application reads them
   /// from the messages.
   bool detailed_events = true;

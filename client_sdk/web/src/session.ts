@@ -5,9 +5,7 @@ import {native, webNames} from './native';
 import {makeReply, refusal} from './reply';
 import {createClient, type SessionOptions} from './session_options';
 import {Status, statusText} from './status';
-import type {
-  AvatarState, Observation, Region, Reply, Role, Subscription, WorldState
-} from './types';
+import type {AvatarState, Observation, Reply, Role, Subscription, WorldState} from './types';
 import {MessageType, type Events, type Message} from '../generated/messages';
 import {NativeEvent, readStatistics} from '../generated/native';
 import * as commands from './wire/commands';
@@ -15,7 +13,7 @@ import {avatarStateOf, eventOf} from './wire/convert';
 import {
   frameHeaderBytes, readMessage, typeOfFrame, writeMessage, type Draft
 } from './wire/frame';
-import {WorldHandle, type ActiveSubscription} from './world';
+import {WorldHandle} from './world';
 
 const cacheTimeoutS = 5;
 
@@ -36,8 +34,7 @@ type Answer = (reply: Reply, message?: Message) => void;
 /**
  * The web client's view of a session of the C++ client, which runs in the WebAssembly module
  * (client_sdk/src/session.h describes its states). The module keeps worlds, commands, the clock and
- * poses. This class turns its events into promises and calls of listeners, and restores worlds and
- * subscriptions when the user connects again after `close`.
+ * poses. This class turns its events into promises and calls of listeners.
  *
  * It has no socket, clock or timer: frames and times are arguments. Listeners and promises are
  * called only after the session has finished processing.
@@ -54,7 +51,6 @@ export class Session {
   state: ClientState = 'idle';
   lastError = '';
   private readonly worlds = new Set<WorldHandle>();
-  private nextSubscription = 1;
   /** The next id for a request without an id. */
   nextRequestId = 1n;
   /** Unanswered commands and inspections, by their numbers. */
@@ -87,15 +83,11 @@ export class Session {
 
   /** Starts to connect. Does nothing if already open. `addressIndex` is an index in `urls`. */
   open(nowS: number, urls: readonly string[] = ['']): void {
-    if (this.isOpen()) return;
+    if (['waiting', 'connecting', 'handshake', 'ready'].includes(this.state)) return;
     this.lastError = '';
     this.run(() => {
       const bytes = native().setInputText(urls.map((url) => `${url}\n`).join(''));
       native().call.open(this.client, bytes, nowS);
-      this.synchronise();
-      for (const world of this.worlds) {
-        if (world.state === 'pending') this.attach(world);
-      }
     });
   }
 
@@ -107,112 +99,62 @@ export class Session {
   joinWorld(name: string, role: Role): WorldHandle {
     const {recordingS, maxRecordedEvents} = this.options;
     const world = new WorldHandle(this, name, role, recordingS, maxRecordedEvents);
-    this.run(() => {
-      try {
-        checkMessage({type: 'JoinWorld', name, role});
-        for (const other of this.worlds) {
-          if (other.name !== name) continue;
-          // A refused world is replaced, so that the user can try again.
-          if (other.state !== 'refused') throw new StridewireError(Status.already_joined, '');
-          this.worlds.delete(other);
-        }
-        this.worlds.add(world);
-        if (this.isOpen()) this.attach(world);
-      } catch (error) {
-        this.refuse(world, refusal(error));
-      }
+    world.joined = this.command(world, () => ({type: 'JoinWorld', name, role}), (handle) => {
+      world.handle = handle;
+      this.worlds.add(world);
     });
+    if (world.handle === 0) world.state = 'refused';
     return world;
   }
 
-  /** Sends the command that `make` returns. `make` throws an error if an argument is invalid. */
-  command(world: WorldHandle, make: () => Draft): Promise<Reply> {
-    return this.attempt((resolve) => this.submit(world, make(), resolve));
+  /**
+   * Sends the command that `make` returns. `make` throws an error if an argument is invalid. Calls
+   * `accept` with the number of the new world or subscription, unless the module refuses the
+   * command.
+   */
+  command(world: WorldHandle, make: () => Draft,
+          accept?: (number: number) => void): Promise<Reply> {
+    return new Promise((resolve) => this.send(world, make, resolve, accept));
   }
 
-  /** Calls `send`. If it throws, the error becomes the reply. */
-  private attempt(send: (resolve: (reply: Reply) => void) => void): Promise<Reply> {
-    return new Promise((resolve) => this.run(() => {
+  /** If the command cannot be sent, the error becomes its answer. */
+  private send(world: WorldHandle, make: () => Draft, answer: Answer,
+               accept: (number: number) => void = () => {}): void {
+    this.run(() => {
       try {
-        send(resolve);
-      } catch (error) {
-        resolve(refusal(error));
-      }
-    }));
-  }
-
-  observe(world: WorldHandle, observation: Observation): Subscription {
-    const id = this.nextSubscription++;
-    const reply = this.attempt((resolve) => {
-      const active = {message: commands.observe(observation), handle: 0, answer: resolve};
-      const waits = world.handle === 0 && world.state === 'pending';
-      if (waits) checkMessage(active.message);  // It is sent when the client connects.
-      world.subscriptions.set(id, active);
-      if (!waits) this.start(world, id, active);
-    });
-    return {
-      id,
-      reply,
-      moveRegion: (region) => this.moveRegion(world, id, region),
-      stop: () => this.stopObserving(world, id),
-    };
-  }
-
-  private moveRegion(world: WorldHandle, id: number, region: Region): Promise<Reply> {
-    return this.attempt((resolve) => {
-      const active = world.subscriptions.get(id);
-      if (active === undefined || active.message.region === null) {
-        throw new StridewireError(Status.no_such_subscription, 'The subscription has no region.');
-      }
-      const moved = {...active.message, region: commands.region(region, active.message.detail)};
-      checkMessage(moved);
-      if (active.handle === 0) {  // The subscription was never sent.
-        resolve(makeReply(0, ''));
-      } else {
-        this.submit(world, {...moved, subscription: active.handle, replace: true}, resolve);
-      }
-      active.message = moved;
-    });
-  }
-
-  private stopObserving(world: WorldHandle, id: number): Promise<Reply> {
-    const active = world.subscriptions.get(id);
-    if (active !== undefined && active.handle === 0) {  // The subscription was never sent.
-      world.subscriptions.delete(id);
-      active.answer?.(makeReply(Status.cancelled, ''));
-      return Promise.resolve(makeReply(0, ''));
-    }
-    return this.attempt((resolve) => {
-      if (active === undefined) throw new StridewireError(Status.no_such_subscription, '');
-      this.submit(world, {type: 'StopObserving', subscription: active.handle}, resolve);
-      world.subscriptions.delete(id);
-    });
-  }
-
-  leave(world: WorldHandle): Promise<Reply> {
-    if (world.handle === 0 && this.worlds.has(world) && world.state === 'pending') {
-      this.run(() => {
-        this.worlds.delete(world);
-        this.refuse(world, makeReply(Status.not_joined, ''), 'left');
-      });
-      return Promise.resolve(makeReply(0, ''));
-    }
-    return this.command(world, () => ({type: 'LeaveWorld'}));
-  }
-
-  inspect(world: WorldHandle, avatar: number): Promise<AvatarState> {
-    return new Promise((resolve, reject) => this.run(() => {
-      const answer: Answer = ({ok, code, text}, message) => {
-        if (ok && message?.type === 'AvatarState') resolve(avatarStateOf(message));
-        else reject(new StridewireError(code, text));
-      };
-      try {
-        const results = this.call(world, {type: 'InspectAvatar', nonce: 0n, avatar});
-        this.pending.set(results[0]!, answer);
+        const bytes = native().setInput(writeMessage(make()));
+        const code = native().call.command(this.client, world.handle, bytes);
+        if (code !== 0) throw new StridewireError(code, webNames(native().text));
+        const [command, number] = native().results;
+        this.pending.set(command!, answer);
+        accept(number!);
       } catch (error) {
         answer(refusal(error));
       }
-    }));
+    });
+  }
+
+  observe(world: WorldHandle, observation: Observation): Subscription {
+    const observed = {...observation};
+    let id = 0;
+    const reply = this.command(
+        world, () => commands.observe(observation), (number) => id = number);
+    return {
+      id,
+      reply,
+      moveRegion: (region) => this.command(world, () => ({
+        ...commands.observe({...observed, avatars: [], region}), subscription: id, replace: true
+      })),
+      stop: () => this.command(world, () => ({type: 'StopObserving', subscription: id})),
+    };
+  }
+
+  inspect(world: WorldHandle, avatar: number): Promise<AvatarState> {
+    return new Promise((resolve, reject) => this.send(
+        world, () => ({type: 'InspectAvatar', nonce: 0n, avatar}), ({ok, code, text}, message) => {
+          if (ok && message?.type === 'AvatarState') resolve(avatarStateOf(message));
+          else reject(new StridewireError(code, text));
+        }));
   }
 
   statistics(nowS = 0): Statistics {
@@ -313,84 +255,6 @@ export class Session {
     this.run(() => native().call.on_output_written(this.client));
   }
 
-  // ---- Commands.
-
-  private isOpen(): boolean {
-    return ['waiting', 'connecting', 'handshake', 'ready'].includes(this.state);
-  }
-
-  /** Sends a message to the module and returns the results.
-   * @throws StridewireError the module refuses the command */
-  private call(world: WorldHandle, message: Draft): Float64Array {
-    const bytes = native().setInput(writeMessage(message));
-    const code = native().call.command(this.client, world.handle, bytes);
-    if (code !== 0) throw new StridewireError(code, webNames(native().text));
-    return native().results;
-  }
-
-  /** Sends a command and returns the number of its subscription.
-   * @throws StridewireError the module refuses the command */
-  private submit(world: WorldHandle, message: Draft,
-                 answer: (reply: Reply) => void): number {
-    const joins =
-        this.worlds.has(world) && world.state !== 'refused' && world.state !== 'left';
-    if (!joins || !this.isOpen()) {
-      checkMessage(message);
-      throw new StridewireError(joins ? Status.closed : Status.not_joined, '');
-    }
-    const results = this.call(world, message);
-    this.pending.set(results[0]!, answer);
-    return results[1]!;
-  }
-
-  /** Joins a world in the module and starts its subscriptions. */
-  private attach(world: WorldHandle): void {
-    try {
-      const {name, role} = world;
-      const results = this.call(world, {type: 'JoinWorld', name, role});
-      world.handle = results[1]!;
-      this.pending.set(results[0]!, (reply) => this.answerJoin(world, reply));
-    } catch (error) {
-      return this.refuse(world, refusal(error));
-    }
-    for (const [id, active] of world.subscriptions) this.start(world, id, active);
-  }
-
-  /** Starts a subscription in the module. */
-  private start(world: WorldHandle, id: number, active: ActiveSubscription): void {
-    const {answer} = active;
-    active.answer = null;
-    try {
-      active.handle = this.submit(world, active.message, (reply) => {
-        if (!reply.ok && reply.code !== Status.cancelled) world.subscriptions.delete(id);
-        if (answer !== null) answer(reply);
-        else if (!reply.ok) this.notice(reply.code, reply.text);
-      });
-    } catch (error) {
-      world.subscriptions.delete(id);
-      answer?.(refusal(error));
-    }
-  }
-
-  private refuse(world: WorldHandle, reply: Reply, state: 'refused' | 'left' = 'refused'): void {
-    this.setWorldState(world, state);
-    for (const {answer} of world.subscriptions.values()) {
-      answer?.(makeReply(Status.not_joined, reply.text));
-    }
-    world.subscriptions.clear();
-    this.answerJoin(world, reply);
-  }
-
-  private answerJoin(world: WorldHandle, reply: Reply): void {
-    const {answerJoin} = world;
-    world.answerJoin = null;
-    if (answerJoin !== null) {
-      this.later(() => answerJoin(reply));
-    } else if (!reply.ok) {
-      this.notice(reply.code, reply.text);
-    }
-  }
-
   // ---- Events of the module.
 
   /**
@@ -476,15 +340,13 @@ export class Session {
           this.onError(status, text);
           break;
         case NativeEvent.sessionLost:
-          for (const each of this.worlds) {
-            if (each.state !== 'refused' && each.state !== 'left') each.reset();
-          }
+          for (const each of this.worlds) each.reset();
           this.later(() => this.listeners.emit('sessionLost'));
           break;
         case NativeEvent.closed:
           accepted = false;
           if (status !== 0) this.onError(status, text);
-          this.detach();
+          for (const each of this.worlds) each.reset();
           break;
         case NativeEvent.reply: {
           // A frame can cause replies to several commands, but describes only one of them.
@@ -565,24 +427,6 @@ export class Session {
     this.later(() => this.listeners.emit('notice', status, text || statusText(status)));
   }
 
-  /**
-   * The module has discarded its worlds. This class keeps them, so that `open` can restore them.
-   */
-  private detach(): void {
-    for (const world of [...this.worlds]) {
-      world.handle = 0;
-      if (world.state === 'left') this.worlds.delete(world);
-      if (world.state === 'left' || world.state === 'refused') continue;
-      world.reset();
-      for (const active of world.subscriptions.values()) active.handle = 0;
-      this.setWorldState(world, 'pending');
-      if (world.terrain !== null) {
-        world.terrain = null;
-        this.later(() => world.listeners.emit('terrain', null));
-      }
-    }
-  }
-
   /** Reports changes of states and of lists of avatars. */
   private synchronise(): void {
     const state = states[native().call.state(this.client, 0)]!;
@@ -590,22 +434,13 @@ export class Session {
       this.state = state;
       this.later(() => this.listeners.emit('state', state));
     }
-    for (const world of [...this.worlds]) {
-      if (world.handle === 0) continue;
+    for (const world of this.worlds) {
       const number = native().call.world_state(this.client, world.handle);
       const revision = native().results[0]!;
-      if (number < 0) {
-        world.handle = 0;
+      this.setWorldState(world, worldStates[number] ?? 'left');
+      if (number < 0 || world.state === 'refused') {
         this.worlds.delete(world);
         world.reset();
-        this.setWorldState(world, 'left');
-        continue;
-      }
-      this.setWorldState(world, worldStates[number]!);
-      if (world.state === 'refused') {
-        world.handle = 0;
-        world.reset();
-        world.subscriptions.clear();
       } else if (revision !== world.revision) {
         world.revision = revision;
         this.later(() => world.listeners.emit('avatars', world.avatars()));
@@ -639,9 +474,3 @@ export class Session {
 
 /** Frees the memory of clients that are no longer used. */
 const finalizers = new FinalizationRegistry<number>((client) => native().call.destroy(client));
-
-/** @throws Error the message is invalid */
-function checkMessage(message: Draft): void {
-  const bytes = native().setInput(writeMessage(message));
-  if (native().call.check_frame(bytes, 1) === 0) throw new Error(webNames(native().text));
-}

@@ -180,7 +180,7 @@ export interface Observation {
 
 /** A running observation. It survives reconnects and lost sessions. */
 export interface Subscription {
-  /** Unique within the client. */
+  /** Unique within the client; 0 if the observation is invalid. */
   readonly id: number;
   /** The server's reply to the observation. */
   readonly reply: Promise<Reply>;

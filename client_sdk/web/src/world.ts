@@ -11,15 +11,6 @@ import type {WorldInfo} from '../generated/messages';
 import * as commands from './wire/commands';
 import type {Draft} from './wire/frame';
 
-/** A subscription that the client restores after lost sessions. */
-export interface ActiveSubscription {
-  message: commands.ObserveDraft;
-  /** Number in the module; 0 if the client is not connected. */
-  handle: number;
-  /** Called with the reply to an observation that has not been sent yet; otherwise null. */
-  answer: ((reply: Reply) => void) | null;
-}
-
 /**
  * A world, with the state that the session keeps for it. Applications use only the interface
  * `World`.
@@ -30,16 +21,13 @@ export class WorldHandle implements World {
   libraryHash = '';
   layers: readonly string[] = [];
   terrain: Terrain | null = null;
-  readonly joined: Promise<Reply>;
+  joined!: Promise<Reply>;
   readonly record: WorldRecording;
 
   // The fields below belong to the session.
   readonly listeners = new Listeners<WorldListeners>();
-  /** The world's number in the WebAssembly module; 0 while the client is not connected. */
+  /** The world's number in the WebAssembly module; 0 if the module has refused it. */
   handle = 0;
-  /** Resolves `joined`; null after the first reply. */
-  answerJoin: ((reply: Reply) => void) | null = null;
-  readonly subscriptions = new Map<number, ActiveSubscription>();
   /** Totals from the last report of the server. */
   reportedDroppedEvents = 0;
   /** Revision of the avatars in the last notification to listeners. */
@@ -48,7 +36,6 @@ export class WorldHandle implements World {
   private skeletonText = '';
   private list = new Uint32Array(0);
   private listRevision = 0;
-  private listHandle = 0;
 
   private readonly crowds = new CrowdReader();
   private readonly roots = new MemoryView(Float32Array);
@@ -56,7 +43,6 @@ export class WorldHandle implements World {
 
   constructor(private readonly session: Session, readonly name: string, readonly role: Role,
               recordingS: number, maxRecordedEvents: number) {
-    this.joined = new Promise((resolve) => this.answerJoin = resolve);
     this.record = new WorldRecording(this, recordingS, maxRecordedEvents);
   }
 
@@ -75,7 +61,7 @@ export class WorldHandle implements World {
       this.send({type: 'SetPlanting', avatars, enabled});
   observe: World['observe'] = (observation) => this.session.observe(this, observation);
   inspect: World['inspect'] = (avatar) => this.session.inspect(this, avatar);
-  leave: World['leave'] = () => this.session.leave(this);
+  leave: World['leave'] = () => this.send({type: 'LeaveWorld'});
   on: World['on'] = (name, listener) => this.listeners.on(name, listener);
 
   private send(message: Draft): Promise<Reply> {
@@ -84,9 +70,8 @@ export class WorldHandle implements World {
 
   avatars(): Uint32Array {
     const revision = this.stateNumbers()?.[0] ?? 0;
-    if (revision !== this.listRevision || this.handle !== this.listHandle) {
+    if (revision !== this.listRevision) {
       this.listRevision = revision;
-      this.listHandle = this.handle;
       const count = native().call.avatars(this.session.client, this.handle);
       this.list = new Uint32Array(native().memoryBuffer, native().results[0], count).slice();
     }
@@ -143,7 +128,7 @@ export class WorldHandle implements World {
     this.layers = info.layers;
   }
 
-  /** Discards everything that the server has sent about the world. Keeps the subscriptions. */
+  /** Discards everything that the server has sent about the world. */
   reset(): void {
     this.reportedDroppedEvents = 0;
     this.record.clearEvents();

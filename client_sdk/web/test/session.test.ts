@@ -407,6 +407,29 @@ test('close cancels commands, sends Goodbye and allows a new connection', async 
   assert.equal(h.lostSessions, 0);
 });
 
+test('worlds and subscriptions change while the client is closed', async () => {
+  const h = new Harness();
+  const plaza = h.session.joinWorld('plaza', 'controller');
+  const yard = h.session.joinWorld('yard', 'observer');
+  assert.deepEqual([plaza.state, yard.state], ['pending', 'pending']);
+  const kept = plaza.observe({mode: 'full'});
+  const stopped = plaza.observe({mode: 'full'});
+  assert.equal(statusOf(await settled(stopped.stop())), 'ok');
+  assert.equal(statusOf(await settled(stopped.reply)), 'cancelled');
+  assert.equal(statusOf(await settled(stopped.stop())), 'no_such_subscription');
+  assert.equal(statusOf(await settled(yard.leave())), 'ok');
+  assert.equal(yard.state, 'left');
+  assert.equal(statusOf(await settled(yard.observe({mode: 'full'}).reply)), 'not_joined');
+  assert.equal(await settled(kept.reply), 'pending');
+  h.connect();
+  assert.deepEqual(summary(h.sent()), ['JoinWorld 1']);
+  h.receive(server.worldInfo(1n, 3, 'plaza'), server.reply(1n));
+  const sent = h.sent();
+  assert.deepEqual(sent.map((m) => m.type === 'Observe' && m.subscription), [kept.id]);
+  h.receive(server.reply(2n));
+  assert.equal(statusOf(await kept.reply), 'ok');
+});
+
 test('listeners may call the session, and their exceptions are reported as uncaught', () => {
   const h = new Harness();
   const world = h.joined();

@@ -311,6 +311,7 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.render_delay_s = numbers[7];
   options.seed = static_cast<std::uint64_t>(numbers[8]);
   options.respawn = numbers[10] != 0.0;  // numbers[9] limits the events, which the module ignores.
+  options.keep_worlds = true;
   options.detailed_events = false;
   options.evaluation = WorldView::Evaluation::kWhenSampled;
   auto client = std::make_unique<Client>(options);
@@ -450,6 +451,10 @@ std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes)
   if (!message) return STRIDEWIRE_INVALID_ARGUMENT;
   std::uint64_t command = 0;
   const stridewire_status status = std::visit(Submit{client->session, world, command}, *message);
+  if (status == STRIDEWIRE_NO_SUCH_WORLD) {  // The client has left the world.
+    SetText(stridewire_status_text(STRIDEWIRE_NOT_JOINED));
+    return STRIDEWIRE_NOT_JOINED;
+  }
   return Report(*client, status, command);
 }
 

@@ -963,6 +963,56 @@ TEST_F(SessionTest, DisconnectAnswersCommandsAndSendsGoodbye) {
   EXPECT_FALSE(session_->NeedsSocket());
 }
 
+TEST_F(SessionTest, KeepsWorldsWhileClosed) {
+  Use({.keep_worlds = true});
+  const stridewire_world world = Joined();
+  std::uint32_t kept = 0;
+  std::uint32_t stopped = 0;
+  EXPECT_EQ(session_->Observe(world, {}, kept, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Observe(world, {}, stopped, command_), STRIDEWIRE_OK);
+  session_->Close(now_s_);
+  (void)Sent();
+  EXPECT_EQ(session_->FindWorldState(world), Session::WorldState::kWanted);
+  EXPECT_FALSE(session_->FindWorld(world)->has_info());
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_CLOSED);
+
+  protocol::Observe circle;
+  circle.region = protocol::Region{.radius_m = 1.0};
+  std::uint32_t moved = 0;
+  std::uint32_t unsent = 0;
+  EXPECT_EQ(session_->Observe(world, circle, moved, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Observe(world, {}, unsent, command_), STRIDEWIRE_OK);
+  const std::uint64_t unsent_command = command_;
+  (void)Events();
+  circle.region->radius_m = 2.0;
+  EXPECT_EQ(session_->MoveRegion(moved, *circle.region, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->StopObserving(stopped, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->StopObserving(unsent, command_), STRIDEWIRE_OK);
+  const auto replies = Events();
+  ASSERT_EQ(replies.size(), 4u);
+  EXPECT_EQ(replies[0].status, STRIDEWIRE_OK);
+  EXPECT_EQ(replies[1].status, STRIDEWIRE_OK);
+  EXPECT_EQ(replies[2].command, unsent_command);
+  EXPECT_EQ(replies[2].status, STRIDEWIRE_CANCELLED);
+  EXPECT_EQ(replies[3].status, STRIDEWIRE_OK);
+
+  stridewire_world other = 0;
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kObserver, other, command_),
+            STRIDEWIRE_ALREADY_JOINED);
+  EXPECT_EQ(session_->JoinWorld("yard", protocol::Role::kObserver, other, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->LeaveWorld(other, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->FindWorld(other), nullptr);
+
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Ready();
+  AnswerJoin();
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 2u);
+  EXPECT_EQ(std::get<protocol::Observe>(sent[0]).subscription, kept);
+  EXPECT_EQ(std::get<protocol::Observe>(sent[1]).subscription, moved);
+  EXPECT_EQ(std::get<protocol::Observe>(sent[1]).region, circle.region);
+}
+
 TEST_F(SessionTest, InvalidServerMessagesCloseTheConnection) {
   const auto breaks = [&](const auto& say) {
     Use({});

@@ -23,19 +23,14 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
   };
 }
 
-export type ObserveDraft = Draft & {
-  readonly region: RegionEntry | null;
-  readonly detail: PoseDetail;
-};
-
-export function observe(observation: Observation): ObserveDraft {
+export function observe(observation: Observation): Draft {
   check.object(observation, new check.Place('observation'));
   const {detail = 'all', region: asked} = observation;
   return {...observation, type: 'Observe', detail, region: asked ? region(asked, detail) : null};
 }
 
 /** `beyond` is the detail of the observation, which applies beyond the rings of the region. */
-export function region(asked: Region, beyond: PoseDetail): RegionEntry {
+function region(asked: Region, beyond: PoseDetail): RegionEntry {
   check.object(asked, new check.Place('region'));
   const {x, z, radiusM, leaveMarginM = null} = asked;
   const rings = objects(asked.rings ?? [], 'rings');
