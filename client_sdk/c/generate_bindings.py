@@ -5,8 +5,8 @@
     client_sdk/c/generate_bindings.py --check    # changes nothing; fails if a file is out of date
 
 The files are committed, because both packages are installed from the source tree. The script reads
-declarations as client.h writes them: one per line, with at most one level of arrays. The functions
-that request movements follow from the schema of the protocol (request_functions.py).
+declarations as the C headers write them: one per line, with at most one level of arrays. The
+functions that request movements follow from the schema of the protocol (request_functions.py).
 
 The layout of a struct belongs to STRIDEWIRE_ABI_VERSION. If it has changed, the script fails unless
 the version has been increased.
@@ -21,7 +21,8 @@ from pathlib import Path
 import request_functions
 
 SDK = Path(__file__).resolve().parent.parent
-HEADERS = [SDK / "c/include/stridewire" / name for name in ("limits.h", "status.h", "client.h")]
+HEADERS = [SDK / "c/include/stridewire" / name
+           for name in ("limits.h", "status.h", "commands.h", "client.h")]
 PYTHON = SDK / "python/stridewire/_abi.py"
 CSHARP = SDK / "unity/Runtime/Abi.cs"
 PYTHON_REQUESTS = SDK / "python/stridewire/_requests.py"

@@ -18,33 +18,6 @@ MAX_RATE_RINGS = 4
 ABI_VERSION = 6
 
 
-class stridewire_client_options(c.Structure):
-    _fields_ = [
-        ("struct_bytes", c.c_size_t),
-        ("abi_version", c.c_uint32),
-        ("max_events", c.c_uint32),
-        ("max_commands", c.c_uint32),
-        ("pose_history", c.c_uint32),
-        ("max_command_bytes", c.c_size_t),
-        ("max_pose_bytes", c.c_size_t),
-        ("render_delay_s", c.c_double),
-        ("connect_timeout_s", c.c_double),
-        ("ping_interval_s", c.c_double),
-        ("seed", c.c_uint64),
-        ("client_name", c.c_char_p),
-        ("auth_token", c.c_char_p),
-        ("respawn", c.c_uint8),
-        ("library_folder", c.c_char_p),
-    ]
-
-
-class stridewire_address(c.Structure):
-    _fields_ = [
-        ("host", c.c_char_p),
-        ("port", c.c_uint16),
-    ]
-
-
 class stridewire_spawn(c.Structure):
     _fields_ = [
         ("avatar", c.c_uint32),
@@ -152,6 +125,33 @@ class stridewire_observation(c.Structure):
         ("avatar_count", c.c_size_t),
         ("detail", c.c_int),
         ("region", c.POINTER(stridewire_region)),
+    ]
+
+
+class stridewire_client_options(c.Structure):
+    _fields_ = [
+        ("struct_bytes", c.c_size_t),
+        ("abi_version", c.c_uint32),
+        ("max_events", c.c_uint32),
+        ("max_commands", c.c_uint32),
+        ("pose_history", c.c_uint32),
+        ("max_command_bytes", c.c_size_t),
+        ("max_pose_bytes", c.c_size_t),
+        ("render_delay_s", c.c_double),
+        ("connect_timeout_s", c.c_double),
+        ("ping_interval_s", c.c_double),
+        ("seed", c.c_uint64),
+        ("client_name", c.c_char_p),
+        ("auth_token", c.c_char_p),
+        ("respawn", c.c_uint8),
+        ("library_folder", c.c_char_p),
+    ]
+
+
+class stridewire_address(c.Structure):
+    _fields_ = [
+        ("host", c.c_char_p),
+        ("port", c.c_uint16),
     ]
 
 

@@ -48,19 +48,6 @@ namespace Stridewire
         OutOfMemory = 450,
     }
 
-    /// <summary>stridewire_client_state of the C API.</summary>
-    public enum ClientState
-    {
-        /// <summary>Never connected, or disconnected by the application.</summary>
-        Idle = 0,
-        /// <summary>Connecting, or waiting for the next attempt.</summary>
-        Connecting = 1,
-        /// <summary>The handshake is complete.</summary>
-        Ready = 2,
-        /// <summary>The server refused the client permanently.</summary>
-        Closed = 3,
-    }
-
     /// <summary>stridewire_role of the C API.</summary>
     public enum Role
     {
@@ -130,6 +117,19 @@ namespace Stridewire
         Reduced = 1,
         /// <summary>Position and rotation of the root only, 18 bytes per pose.</summary>
         Root = 2,
+    }
+
+    /// <summary>stridewire_client_state of the C API.</summary>
+    public enum ClientState
+    {
+        /// <summary>Never connected, or disconnected by the application.</summary>
+        Idle = 0,
+        /// <summary>Connecting, or waiting for the next attempt.</summary>
+        Connecting = 1,
+        /// <summary>The handshake is complete.</summary>
+        Ready = 2,
+        /// <summary>The server refused the client permanently.</summary>
+        Closed = 3,
     }
 
     /// <summary>stridewire_event_type of the C API.</summary>
@@ -241,33 +241,6 @@ namespace Stridewire
     }
 
     [StructLayout(LayoutKind.Sequential)]
-    internal unsafe struct stridewire_client_options
-    {
-        public UIntPtr struct_bytes;
-        public uint abi_version;
-        public uint max_events;
-        public uint max_commands;
-        public uint pose_history;
-        public UIntPtr max_command_bytes;
-        public UIntPtr max_pose_bytes;
-        public double render_delay_s;
-        public double connect_timeout_s;
-        public double ping_interval_s;
-        public ulong seed;
-        public byte* client_name;
-        public byte* auth_token;
-        public byte respawn;
-        public byte* library_folder;
-    }
-
-    [StructLayout(LayoutKind.Sequential)]
-    internal unsafe struct stridewire_address
-    {
-        public byte* host;
-        public ushort port;
-    }
-
-    [StructLayout(LayoutKind.Sequential)]
     internal unsafe struct stridewire_spawn
     {
         public uint avatar;
@@ -375,6 +348,33 @@ namespace Stridewire
         public UIntPtr avatar_count;
         public PoseDetail detail;
         public stridewire_region* region;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal unsafe struct stridewire_client_options
+    {
+        public UIntPtr struct_bytes;
+        public uint abi_version;
+        public uint max_events;
+        public uint max_commands;
+        public uint pose_history;
+        public UIntPtr max_command_bytes;
+        public UIntPtr max_pose_bytes;
+        public double render_delay_s;
+        public double connect_timeout_s;
+        public double ping_interval_s;
+        public ulong seed;
+        public byte* client_name;
+        public byte* auth_token;
+        public byte respawn;
+        public byte* library_folder;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal unsafe struct stridewire_address
+    {
+        public byte* host;
+        public ushort port;
     }
 
     [StructLayout(LayoutKind.Sequential)]
@@ -809,8 +809,6 @@ namespace Stridewire
         /// on 64-bit targets, or null.</summary>
         public static string FindWrongLayout()
         {
-            if (sizeof(stridewire_client_options) != 104) return "stridewire_client_options";
-            if (sizeof(stridewire_address) != 16) return "stridewire_address";
             if (sizeof(stridewire_spawn) != 40) return "stridewire_spawn";
             if (sizeof(stridewire_movement) != 144) return "stridewire_movement";
             if (sizeof(stridewire_height_field) != 40) return "stridewire_height_field";
@@ -821,6 +819,8 @@ namespace Stridewire
             if (sizeof(stridewire_rate_ring) != 16) return "stridewire_rate_ring";
             if (sizeof(stridewire_region) != 56) return "stridewire_region";
             if (sizeof(stridewire_observation) != 40) return "stridewire_observation";
+            if (sizeof(stridewire_client_options) != 104) return "stridewire_client_options";
+            if (sizeof(stridewire_address) != 16) return "stridewire_address";
             if (sizeof(stridewire_parameters) != 64) return "stridewire_parameters";
             if (sizeof(stridewire_event) != 520) return "stridewire_event";
             if (sizeof(stridewire_joint) != 84) return "stridewire_joint";

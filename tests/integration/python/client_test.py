@@ -54,10 +54,11 @@ def stop(server):
 
 
 class Layout(unittest.TestCase):
-    """The ctypes structs match the C header."""
+    """The ctypes structs match the C headers."""
 
     def setUp(self):
-        self.header = (ROOT / "client_sdk/c/include/stridewire/client.h").read_text()
+        self.header = "".join((ROOT / "client_sdk/c/include/stridewire" / name).read_text()
+                              for name in ("client.h", "commands.h"))
         self.abi_test = (ROOT / "tests/unit/client_sdk/c_abi_test.c").read_text()
 
     def test_version(self):

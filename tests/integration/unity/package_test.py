@@ -69,7 +69,7 @@ class Package(unittest.TestCase):
 
     def enum_names(self):
         text = "".join((ROOT / "client_sdk/c/include/stridewire" / name).read_text()
-                       for name in ("client.h", "status.h"))
+                       for name in ("client.h", "commands.h", "status.h"))
         return set(re.findall(r"^typedef enum (\w+)", text, re.M))
 
     def test_live(self):

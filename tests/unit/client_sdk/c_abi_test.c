@@ -14,27 +14,6 @@ _Static_assert(STRIDEWIRE_ABI_VERSION == 6, "the numbers below belong to this ve
 
 #if UINTPTR_MAX == UINT64_MAX
 
-SIZE(stridewire_client_options, 104);
-OFFSET(stridewire_client_options, struct_bytes, 0);
-OFFSET(stridewire_client_options, abi_version, 8);
-OFFSET(stridewire_client_options, max_events, 12);
-OFFSET(stridewire_client_options, max_commands, 16);
-OFFSET(stridewire_client_options, pose_history, 20);
-OFFSET(stridewire_client_options, max_command_bytes, 24);
-OFFSET(stridewire_client_options, max_pose_bytes, 32);
-OFFSET(stridewire_client_options, render_delay_s, 40);
-OFFSET(stridewire_client_options, connect_timeout_s, 48);
-OFFSET(stridewire_client_options, ping_interval_s, 56);
-OFFSET(stridewire_client_options, seed, 64);
-OFFSET(stridewire_client_options, client_name, 72);
-OFFSET(stridewire_client_options, auth_token, 80);
-OFFSET(stridewire_client_options, respawn, 88);
-OFFSET(stridewire_client_options, library_folder, 96);
-
-SIZE(stridewire_address, 16);
-OFFSET(stridewire_address, host, 0);
-OFFSET(stridewire_address, port, 8);
-
 SIZE(stridewire_spawn, 40);
 OFFSET(stridewire_spawn, avatar, 0);
 OFFSET(stridewire_spawn, position_m, 8);
@@ -114,6 +93,27 @@ OFFSET(stridewire_observation, avatars, 8);
 OFFSET(stridewire_observation, avatar_count, 16);
 OFFSET(stridewire_observation, detail, 24);
 OFFSET(stridewire_observation, region, 32);
+
+SIZE(stridewire_client_options, 104);
+OFFSET(stridewire_client_options, struct_bytes, 0);
+OFFSET(stridewire_client_options, abi_version, 8);
+OFFSET(stridewire_client_options, max_events, 12);
+OFFSET(stridewire_client_options, max_commands, 16);
+OFFSET(stridewire_client_options, pose_history, 20);
+OFFSET(stridewire_client_options, max_command_bytes, 24);
+OFFSET(stridewire_client_options, max_pose_bytes, 32);
+OFFSET(stridewire_client_options, render_delay_s, 40);
+OFFSET(stridewire_client_options, connect_timeout_s, 48);
+OFFSET(stridewire_client_options, ping_interval_s, 56);
+OFFSET(stridewire_client_options, seed, 64);
+OFFSET(stridewire_client_options, client_name, 72);
+OFFSET(stridewire_client_options, auth_token, 80);
+OFFSET(stridewire_client_options, respawn, 88);
+OFFSET(stridewire_client_options, library_folder, 96);
+
+SIZE(stridewire_address, 16);
+OFFSET(stridewire_address, host, 0);
+OFFSET(stridewire_address, port, 8);
 
 SIZE(stridewire_parameters, 64);
 OFFSET(stridewire_parameters, values, 0);
@@ -250,13 +250,13 @@ OFFSET(stridewire_statistics, buffered_bytes, 120);
 OFFSET(stridewire_statistics, rtt_s, 128);
 
 SIZE(stridewire_status, 4);
-SIZE(stridewire_client_state, 4);
 SIZE(stridewire_role, 4);
 SIZE(stridewire_movement_type, 4);
 SIZE(stridewire_foot, 4);
 SIZE(stridewire_interrupt, 4);
 SIZE(stridewire_pose_mode, 4);
 SIZE(stridewire_pose_detail, 4);
+SIZE(stridewire_client_state, 4);
 SIZE(stridewire_event_type, 4);
 SIZE(stridewire_movement_kind, 4);
 SIZE(stridewire_outcome, 4);
