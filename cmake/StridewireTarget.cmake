@@ -67,12 +67,13 @@ function(stridewire_flatbuffers target)
   set(headers)
   foreach(schema IN LISTS ARGN)
     get_filename_component(name ${schema} NAME_WE)
+    get_filename_component(schema ${schema} ABSOLUTE)
     set(header ${generated_dir}/${name}_generated.h)
     add_custom_command(
       OUTPUT ${header}
       COMMAND ${STRIDEWIRE_FLATC} --cpp --cpp-std c++17 --scoped-enums --gen-mutable
-              -o ${generated_dir} ${CMAKE_CURRENT_SOURCE_DIR}/${schema}
-      DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${schema}
+              -o ${generated_dir} ${schema}
+      DEPENDS ${schema}
       VERBATIM)
     list(APPEND headers ${header})
   endforeach()

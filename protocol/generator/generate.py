@@ -2,6 +2,7 @@
 """Generates code from the schema of the protocol: generate.py SCHEMA KIND FOLDER.
 
 KIND is one of:
+  flatc   the schema with declarations of its attributes, for flatc
   cpp     limits.h, message_type.h, message_structs.h, message_list.h, codec.h and codec.cpp
   client  client/request_from_c.h, for the C API of the client
   json    fields_json.h and fields_json.cpp, for the test vectors
@@ -21,6 +22,8 @@ from typescript_codec import TypeScriptCodec
 
 
 def files(schema, kind):
+    if kind == "flatc":
+        return {schema.path: schema.for_flatc()}
     if kind == "cpp":
         cpp = Cpp(schema)
         return {"include/stridewire/protocol/limits.h": cpp.limits_header(),

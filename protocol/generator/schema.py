@@ -83,6 +83,7 @@ class Table:
 class Schema:
     def __init__(self, path, text):
         self.path = path
+        self.text = text
         self.enums = {}
         self.tables = {}
         self.limits = {}  # Name of a limit: the Field that declares it.
@@ -93,6 +94,13 @@ class Schema:
 
     def fail(self, line, text):
         raise SchemaError(f"{self.path}:{line}: {text}")
+
+    def for_flatc(self):
+        """The schema with declarations of the attributes, which flatc requires."""
+        attributes = TABLE_ATTRIBUTES | FIELD_ATTRIBUTES | ENUM_ATTRIBUTES
+        declarations = "".join(f'attribute "{name}";\n'
+                               for name in sorted(attributes - {"deprecated"}))
+        return f"// Generated from {self.path} by protocol/generator.\n{declarations}\n{self.text}"
 
     @property
     def messages(self):

@@ -31,12 +31,15 @@ const newest = Math.max(...[schema, path('generate.mjs'), ...nativeSources, ...s
 if (!existsSync(last) || statSync(last).mtimeMs < newest) {
   rmSync(out, {recursive: true, force: true});
   mkdirSync(out, {recursive: true});
-  run('FLATC', 'flatc', 'flatbuffers-compiler', ['--ts', '-o', out, schema]);
+  const generate = (kind) =>
+      run('PYTHON', 'python3', 'python3', [`${generator}/generate.py`, schema, kind, out]);
+  generate('flatc');
+  run('FLATC', 'flatc', 'flatbuffers-compiler', ['--ts', '-o', out, `${out}/stridewire.fbs`]);
   // The index that flatc 2.0.8 generates omits tables without references, which includes all
   // messages.
   const modules = readdirSync(`${out}/stridewire/wire`).sort();
   writeFileSync(`${out}/wire.ts`, modules.map((file) =>
       `export * from './stridewire/wire/${file.replace(/\.ts$/, '')}';\n`).join(''));
   writeFileSync(`${out}/native.ts`, nativeModule());
-  run('PYTHON', 'python3', 'python3', [`${generator}/generate.py`, schema, 'web', out]);
+  generate('web');
 }

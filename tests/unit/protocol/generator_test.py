@@ -61,6 +61,14 @@ class SchemaTest(unittest.TestCase):
         self.assertTrue(paint.fields[3].is_list)
         self.assertEqual(paint.fields[3].attributes, {"min": "1", "max": "max_items"})
 
+    def test_declares_the_attributes_for_flatc(self):
+        text = "table A (bulk) { x: string (max: \"9\"); y: uint (deprecated); }"
+        declared = read(text).for_flatc()
+        for attribute in ("bulk", "max"):
+            self.assertIn(f'attribute "{attribute}";\n', declared)
+        self.assertNotIn('attribute "deprecated"', declared)  # flatc declares it.
+        self.assertTrue(declared.endswith(text))
+
     def test_lays_out_structs_with_padding(self):
         schema = read(SMALL)
         self.assertEqual(schema.inline_layout("Point"), (16, 8))
