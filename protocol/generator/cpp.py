@@ -56,7 +56,7 @@ class Cpp:
         return f'{{{self.bound(low)}, {self.bound(f.get("max"))}, "{expected}"}}'
 
     def at(self, f):
-        return "at" if f.get("cpp") == "." else f'At(at, "{f.name}")'
+        return "at" if f.get("cpp") == "." else f'{{&at, "{f.name}"}}'
 
     def is_float(self, f):
         return f.type in ("float", "double")
@@ -124,11 +124,21 @@ class Cpp:
         return (f'found.Entries({self.member(f)}, [](auto entry) {{ return {condition}; }}, '
                 f'ErrorCode::k{code}, "{text}", {self.at(f)});')
 
+    def keys_check(self, f, key):
+        """A check that the numbers `key` of a list are different values of an enum."""
+        enum = self.schema.enums[key.get("keys")]
+        words = re.sub(r"(?<!^)(?=[A-Z])", " ", enum.name).lower()
+        number = f"&{self.type_name(f.type)}::{key.name}" if f is not key else "std::identity{}"
+        return (f"found.Keys({self.member(f)}, {number}, {len(enum.values)}, "
+                f'"expected a {words} from 0 to {len(enum.values) - 1}", '
+                f'"a {words.removesuffix(" name")} occurs twice", {self.at(f)});')
+
     def check(self, f):
         m, at = self.member(f), self.at(f)
         if f.is_list:
+            keys = [self.keys_check(f, key) for key in self.schema.keys(f)]
             if f.type in self.schema.tables:
-                return [f"CheckList(found, {m}, {self.bounds(f)}, {at});"]
+                return [f"CheckList(found, {m}, {self.bounds(f)}, {at});", *keys]
             lines = [f"found.Count({m}.size(), {self.bounds(f)}, {at});"]
             if self.is_float(f):
                 lines.append(self.entries_check(f, "std::isfinite(entry)",
@@ -139,7 +149,7 @@ class Cpp:
                 last = len(self.schema.enums[enum].values) - 1
                 lines.append(self.entries_check(f, f"static_cast<unsigned>(entry) <= {last}",
                                                 f"expected numbers from 0 to {last}", "Malformed"))
-            return lines
+            return lines + keys
         if f.type == "string":
             return [f"found.Text({m}, {self.bounds(f)}, {at});"]
         if f.type in self.schema.tables:
@@ -168,6 +178,11 @@ class Cpp:
             lines.append(self.that(f"{m}.size() == {self.member(other)}.size()", at,
                                    f"expected one entry per {other.name[:-1]}", "ShapeMismatch",
                                    f"{m}.size()"))
+        if count := f.get("count"):
+            product = " * ".join(self.member(fields[name]) for name in count.split(" * "))
+            lines.append(self.that(f"{m}.size() == std::size_t{{1}} * {product}", at,
+                                   f"expected {count} {re.sub('_m$', '', f.name)}",
+                                   "ShapeMismatch", f"{m}.size()"))
         if other := fields.get(f.get("requires")):
             lines.append(self.that(f"!{m} || {self.member(other)}", at,
                                    f"{f.name} requires a {other.name}", "Malformed"))
@@ -181,8 +196,9 @@ class Cpp:
         fields = self.common_fields(table) if "variant" in table else table.fields
         lines = [self.used_if(f, "m.{}") + line for f in fields for line in self.check(f)]
         lines += [line for f in fields for line in self.relations(f, table)]
-        if "native" in table:
-            finite = " && ".join(f"std::isfinite({self.member(f)})" for f in fields)
+        if "native" in table or "web" in table:
+            finite = " && ".join(f"std::isfinite({self.member(f)})" for f in fields
+                                 if self.is_float(f))
             lines = [self.that(finite, "at", "expected a finite number")]
         if "variant" in table:
             lines.append("std::visit([&](const auto& used) { CheckFields(found, at, used); }, "
@@ -236,13 +252,13 @@ class Cpp:
                 names = " and ".join(f.name for f in needed)
                 lines = [f"if ({absent}) {{",
                          f'  return found.Wrong(ErrorCode::kMalformed, "a {value.lower()} requires '
-                         f'{names}", At(at, "type"));', "}"] + lines
+                         f'{names}", {{&at, "type"}});', "}"] + lines
             functions.append(self.unpack_function(table, lines, alternative.name))
             cases.append(f"  case wire::{enum.name}::{value}: return Unpack(found, at, w, "
                          f"{self.variant(table)}.emplace<{alternative.name}>());")
         last = len(cases) - 1
         lines = self.unpack_lines(table) + ["switch (w.type()) {", *cases, "}"]
-        lines.append(self.known("w.type()", last, 'At(at, "type")'))
+        lines.append(self.known("w.type()", last, '{&at, "type"}'))
         return functions + [self.unpack_function(table, lines)]
 
     # ---- encoding
@@ -513,7 +529,7 @@ class Cpp:
         done = []
 
         def add(table):
-            if table in done or "native" in table or table.by_hand("struct"):
+            if table in done or "native" in table or "handwritten" in table:
                 return
             for f in table.fields:
                 if f.type in self.schema.tables:
@@ -575,8 +591,7 @@ class Cpp:
         for t in self.schema.tables.values():
             if "variant" in t:
                 parts += [self.check_function(each) for each in self.schema.alternatives(t)]
-            if not t.by_hand("check"):
-                parts.append(self.check_function(t))
+            parts.append(self.check_function(t))
             parts += self.unpack_functions(t)
             parts.append(self.to_wire_function(t) if t.is_struct else self.build_function(t))
         return (self.head() + '#include "codec_support.h"\n\nnamespace stridewire::protocol {\n\n' +

@@ -117,7 +117,7 @@ class CppJson(Cpp):
         declarations = "".join(f"void to_json(Json& json, const {self.type_name(t.name)}& m);\n"
                                f"void from_json(const Json& json, {self.type_name(t.name)}& m);\n"
                                for t in self.objects)
-        serializers += "".join(self.serializer(t) for t in self.objects if t.by_hand("struct"))
+        serializers += "".join(self.serializer(t) for t in self.objects if "handwritten" in t)
         return (self.head() + "#pragma once\n\nnamespace stridewire::protocol {\n\n" +
                 declarations + "\n}  // namespace stridewire::protocol\n\n" + serializers)
 

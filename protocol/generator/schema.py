@@ -16,10 +16,10 @@ TABLE_ATTRIBUTES = {
     "variant", "web",
 }
 FIELD_ATTRIBUTES = {
-    "above", "below", "borrowed", "bytes", "cpp", "deprecated", "early", "enumerators", "group",
-    "initial", "inverted", "json_array", "json_omit", "json_place", "keep_empty", "max", "min",
-    "min_or_none", "needed", "nonzero", "number", "omit_zero", "only", "optional", "per",
-    "requires", "shared", "status", "web", "with", "without",
+    "above", "below", "borrowed", "bytes", "count", "cpp", "deprecated", "early", "enumerators",
+    "group", "initial", "inverted", "json_array", "json_omit", "json_place", "keep_empty",
+    "keys", "max", "min", "min_or_none", "needed", "nonzero", "number", "omit_zero", "only",
+    "optional", "per", "requires", "shared", "status", "web", "with", "without",
 }
 ENUM_ATTRIBUTES = {"cpp", "handwritten"}
 
@@ -76,9 +76,6 @@ class Table:
     def fields(self):
         return [f for f in self.all_fields if "deprecated" not in f]
 
-    def by_hand(self, what):
-        return what in self.get("handwritten", "").split()
-
 
 class Schema:
     def __init__(self, path, text):
@@ -129,12 +126,19 @@ class Schema:
         elif "above" in f or "below" in f:
             text = f"Above {name(f.get('above'))}." if "above" in f else \
                 f"Below {name(f.get('below'))}."
+        elif "keys" in f and not f.is_list:
+            text = f"A {f.get('keys')}."
         else:
             text = "Not 0." if "nonzero" in f and not f.is_list else ""
         if not text or not f.doc:
             return f.doc + [text] if text else f.doc
         joined = f"{f.doc[-1]} {text}"
         return f.doc[:-1] + [joined] if len(joined) <= 90 else f.doc + [text]
+
+    def keys(self, f):
+        """The field itself, or the members of the entries of its list, that are unique."""
+        fields = self.tables[f.type].fields if f.type in self.tables else [f]
+        return [each for each in fields if "keys" in each]
 
     def is_constant(self, value):
         """Whether a bound is a number or a limit. Otherwise it is a field of the same table."""
@@ -262,8 +266,9 @@ class Schema:
             for f in table.all_fields:
                 self._check_field(f, f"{table.name}.{f.name}", table)
                 names = [each.name for each in table.fields]
-                for attribute in ("with", "without", "keep_empty", "per", "requires"):
-                    other = f.get(attribute)
+                others = [f.get(attribute) for attribute in
+                          ("with", "without", "keep_empty", "per", "requires")]
+                for other in others + f.get("count", "").split(" * "):
                     if other and other not in names:
                         self.fail(f.line, f"{table.name}.{f.name}: there is no field '{other}'")
 
@@ -278,8 +283,9 @@ class Schema:
             self.fail(f.line, f"{where}: a list or text needs the attribute 'max'")
         if is_object and not f.is_list and ("min" in f or "max" in f):
             self.fail(f.line, f"{where}: 'min' and 'max' do not apply to a table or struct")
-        if f.get("enumerators") and f.get("enumerators") not in self.enums:
-            self.fail(f.line, f"{where}: unknown enum '{f.get('enumerators')}'")
+        for attribute in ("enumerators", "keys"):
+            if attribute in f and f.get(attribute) not in self.enums:
+                self.fail(f.line, f"{where}: unknown enum '{f.get(attribute)}'")
         for bound in ("min", "max", "above", "below", "min_or_none"):
             value = f.get(bound)
             if value is None:

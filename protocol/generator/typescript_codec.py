@@ -17,6 +17,10 @@ class TypeScriptCodec(TypeScript):
     def table_of(self, f):
         return self.schema.tables.get(f.type)
 
+    def key_and_value(self, table):
+        """The members of a struct that is a property in TypeScript."""
+        return sorted(table.fields, key=lambda f: "keys" not in f)
+
     def is_parameters(self, f):
         return self.table_of(f) is not None and "web" in self.table_of(f)
 
@@ -98,8 +102,9 @@ class TypeScriptCodec(TypeScript):
             result = self.type_of(self.only_member(table))
             lines = [f"return {self.read(table.fields[0])};"]
         elif "web" in table:
+            key, value = self.key_and_value(table)
             result = "[string, number]"
-            lines = ["return [enums.ParameterName[w.name()]!, w.value()];"]
+            lines = [f"return [enums.{key.get('keys')}[w.{key.name}()]!, w.{value.name}()];"]
         elif self.is_tuple(table):
             result = f"[{', '.join(['number'] * len(table.fields))}]"
             lines = [f"return [{', '.join(f'w.{f.name}()' for f in table.fields)}];"]
@@ -153,14 +158,15 @@ class TypeScriptCodec(TypeScript):
         list_name = camel(f.name) + "Vector"
         inner = self.table_of(f)
         if self.is_parameters(f):
-            value = f"parameterList({name})"
+            value = f"list{f.type}({name})"
         elif f.is_list:
             value = f"check.list({name}, {at}, (value, entry) => {self.check(f, 'value', 'entry')})"
         else:
             value = self.check(f, name, at)
         if f.is_list and inner is not None and inner.is_struct:
-            value = (f"structs(b, {value}, wire.{table.name}.start{list_name}, "
-                     f"(values) => wire.{f.type}.create{f.type}(b, ...values))")
+            pack = f"({{pack: () => wire.{f.type}.create{f.type}(b, ...values)}})"
+            value = (f"b.createStructOffsetList({value}.map((values) => {pack}), "
+                     f"wire.{table.name}.start{list_name})")
         elif f.is_list:
             value = f"wire.{table.name}.create{list_name}(b, {value})"
         elif f.type == "string":
@@ -236,7 +242,13 @@ class TypeScriptCodec(TypeScript):
         """Checks the members of a struct and returns the arguments of flatc's function."""
         lines = []
         if "web" in table:
-            return ""
+            key, _ = self.key_and_value(table)
+            number = f"enums.{key.get('keys')}.indexOf(name as never)"
+            entry = ", ".join(number if f is key else "value" for f in table.fields)
+            return ("/** Returns the arguments for each property of an object. */\n" +
+                    self.function(f"function list{table.name}(value: unknown): [number, number][]",
+                                  [f"return Object.entries(value as {table.get('web')}).map("
+                                   f"([name, value]) => [{entry}]);"]))
         if self.is_tuple(table):
             count = len(table.fields)
             lines.append(f"const members = check.tuple(value, at, {count});")
@@ -273,19 +285,20 @@ class TypeScriptCodec(TypeScript):
         names = ", ".join(sorted(
             self.interface_name(t) for t in tables
             if not self.is_tuple(t) and "web" not in t and not self.only_member(t)))
-        readers = "".join(f"  {m.name}: (bytes: ByteBuffer) => "
+        readers = "".join(f"  {m.get('message')}: (bytes: ByteBuffer) => "
                           f"read{m.name}(wire.{m.name}.getRootAs{m.name}(bytes)),\n"
                           for m in self.schema.messages)
         builders = "".join(f"  {m.name}: build{m.name},\n" for m in self.schema.messages)
         return (self.head() +
                 "import {Builder, ByteBuffer, Encoding} from 'flatbuffers';\n"
                 "import * as check from '../src/wire/check';\n"
-                "import {parameterList} from '../src/wire/parameters';\n"
-                "import {absent, structs, text, zeros} from '../src/wire/support';\n"
-                f"import {{enums, type {names.replace(', ', ', type ')}}} from './messages';\n"
-                "import * as wire from './wire';\n\n" + "\n".join(filter(None, functions)) +
-                "\n/** Read the message that begins at the position of `bytes`. */\n"
-                f"export const readers = {{\n{readers}}};\n\n"
+                "import type {Parameters} from '../src/types';\n"
+                "import {absent, text, zeros} from '../src/wire/support';\n"
+                f"import {{enums, type Message, type {names.replace(', ', ', type ')}}} "
+                "from './messages';\nimport * as wire from './wire';\n\n" + "\n".join(functions) +
+                "\n/** Read the message that begins at the position of `bytes`, by its number. */\n"
+                "export const readers: {[type: number]: (bytes: ByteBuffer) => Message} = "
+                f"{{\n{readers}}};\n\n"
                 "/** Check a message, and build its table. */\n"
                 f"export const builders = {{\n{builders}}};\n")
 
@@ -308,6 +321,12 @@ class TypeScriptCodec(TypeScript):
             return f"!{value}"
         return f"String({value})" if f.type == "ulong" else value
 
+    def is_present(self, f, m, value):
+        """The condition under which a field with the attribute `json_omit` is in the JSON."""
+        if f.is_list:
+            return f"{m}.length > 0"
+        return f"{m} !== null" if "optional" in f or f.default == "null" else value
+
     def json_lines(self, table):
         properties = self.properties(table)
         for f in table.fields:
@@ -317,7 +336,10 @@ class TypeScriptCodec(TypeScript):
             if "bytes" in f:
                 value = f"Buffer.from({m}).toString('hex')"
             elif self.is_parameters(f):
-                value = f"parameterList({m}).map(([value, name]) => ({{name, value}}))"
+                key, number = self.key_and_value(self.table_of(f))
+                index = f"enums.{key.get('keys')}.indexOf(name as never)"
+                value = (f"Object.entries({m}).map(([name, value]) => "
+                         f"({{{key.name}: {index}, {number.name}: value}}))")
             elif f.is_list:
                 value = f"Array.from({m}, (entry) => {self.json_value(f, 'entry')})"
             elif "optional" in f or f.default == "null":
@@ -329,7 +351,8 @@ class TypeScriptCodec(TypeScript):
             conditions = [self.used_if(f, table, "m.")]
             if "json_omit" in f:
                 other = f.get("json_omit")
-                conditions.append(f"!isEmpty({f'm.{lower_camel(other)}' if other else value})")
+                conditions.append(f"m.{lower_camel(other)} !== null" if other else
+                                  self.is_present(f, m, value))
             condition = " && ".join(filter(None, conditions))
             yield f"if ({condition}) {line}" if condition else line
 
@@ -341,8 +364,7 @@ class TypeScriptCodec(TypeScript):
             f"function json{t.name}(m: {self.interface_name(t)}): Json",
             ["const json: Json = {};", *self.json_lines(t), "return json;"]) for t in tables)
         rows = "".join(f"  {m.name}: json{m.name},\n" for m in self.schema.messages)
-        return (self.head() + "import {parameterList} from '../src/wire/parameters';\n"
-                "import {isEmpty, type Json} from '../test/support/to_json';\n"
+        return (self.head() + "import type {Json} from '../test/support/to_json';\n"
                 f"import {{enums, type {names.replace(', ', ', type ')}}} from './messages';\n\n" +
                 functions + "\n/** Convert messages to the JSON of protocol/vectors. */\n"
                 f"export const toFields = {{\n{rows}}};\n")

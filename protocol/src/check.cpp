@@ -1,7 +1,6 @@
 #include "stridewire/protocol/check.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <string_view>
 #include <utility>
@@ -20,61 +19,33 @@ void Findings::Wrong(ErrorCode code, const char* text, const FieldPath& at, std:
   error_ = Error{code, text, value, {}};
   for (const FieldPath* path = &at; path != nullptr; path = path->parent) {
     error_->where = std::string(path->name) + (error_->where.empty() ? "" : "." + error_->where);
-    if (path->index >= 0) error_->index = path->index;
-  }
-}
-
-namespace {
-
-/// Checks the name of a parameter. `seen` has a bit for each previous name.
-void CheckName(Findings& found, const FieldPath& at, std::uint8_t name, unsigned& seen) {
-  found.That(name < kParameterNames, at, "expected a parameter name from 0 to 8",
-             ErrorCode::kMalformed, name);
-  const unsigned bit = 1u << (name % kParameterNames);
-  found.That((seen & bit) == 0, at, "a parameter occurs twice", ErrorCode::kMalformed, name);
-  seen |= bit;
-}
-
-}  // namespace
-
-void CheckList(Findings& found, const std::vector<ParameterValue>& list, const Bounds& bounds,
-               const FieldPath& at) {
-  found.Count(list.size(), bounds, at);
-  unsigned seen = 0;
-  for (const ParameterValue& parameter : list) {
-    CheckName(found, at, parameter.name, seen);
-    found.That(std::isfinite(parameter.value), at, "expected a finite number");
+    if (path->index != FieldPath::kNoIndex) error_->index = static_cast<std::int64_t>(path->index);
   }
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const Observe& m) {
   const bool has_details = m.mode == PoseMode::kQuantised;
   constexpr auto kNoDetails = "levels of detail require mode 1 (quantised)";
-  found.That(m.detail == PoseDetail::kAll || has_details, At(at, "detail"), kNoDetails,
+  found.That(m.detail == PoseDetail::kAll || has_details, {&at, "detail"}, kNoDetails,
              ErrorCode::kUnsupported);
   if (!m.region) return;
-  found.That(m.avatars.empty(), At(at, "avatars"), "avatars must be empty if a region is given",
+  found.That(m.avatars.empty(), {&at, "avatars"}, "avatars must be empty if a region is given",
              ErrorCode::kMalformed);
-  const FieldPath region = At(at, "region");
+  const FieldPath region{&at, "region"};
   const auto& rings = m.region->rings;
   double before_m = 0.0;
   for (std::size_t i = 0; i < rings.size(); ++i) {
-    found.That(rings[i].to_m > before_m, At(At(region, "rings", i), "to_m"),
+    const FieldPath ring{&region, "rings", i};
+    found.That(rings[i].to_m > before_m, {&ring, "to_m"},
                "expected a radius above that of the previous ring");
     before_m = rings[i].to_m;
   }
   const std::size_t details = m.region->ring_details.size();
   if (details == 0) return;
-  const FieldPath path = At(region, "ring_details");
+  const FieldPath path{&region, "ring_details"};
   found.That(details == rings.size(), path, "expected one detail per ring", ErrorCode::kMalformed,
              details);
   found.That(has_details, path, kNoDetails, ErrorCode::kUnsupported);
-}
-
-void CheckMeaning(Findings& found, const FieldPath& at, const HeightFieldInfo& m) {
-  const std::size_t count = m.heights_m.size();
-  found.That(count == std::size_t{m.columns} * m.rows, At(at, "heights_m"),
-             "expected columns * rows heights", ErrorCode::kShapeMismatch, count);
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const TerrainBoxInfo& m) {
@@ -83,43 +54,44 @@ void CheckMeaning(Findings& found, const FieldPath& at, const TerrainBoxInfo& m)
 
 void CheckMeaning(Findings& found, const FieldPath& at, const SkeletonInfo& m) {
   const std::size_t joint_count = m.joints.size();
+  const FieldPath joints{&at, "joints"};
   std::set<std::string_view> names;
   for (std::size_t j = 0; j < joint_count; ++j) {
     const JointInfo& joint = m.joints[j];
+    const FieldPath path{&at, "joints", j};
     found.That(j == 0 ? joint.parent == -1 : joint.parent >= 0 && std::cmp_less(joint.parent, j),
-               At(At(at, "joints", j), "parent"),
-               "expected -1 for joint 0, else a joint that precedes this one",
+               {&path, "parent"}, "expected -1 for joint 0, else a joint that precedes this one",
                ErrorCode::kOutOfRange, joint.parent);
-    found.That(names.insert(joint.name).second, At(At(at, "joints"), "name"), "a name occurs twice",
+    found.That(names.insert(joint.name).second, {&joints, "name"}, "a name occurs twice",
                ErrorCode::kMalformed);
   }
   for (std::size_t e = 0; e < m.end_sites.size(); ++e) {
     const std::uint16_t joint = m.end_sites[e].joint;
-    found.That(joint < joint_count, At(At(at, "end_sites", e), "joint"),
-               "expected the index of a joint", ErrorCode::kOutOfRange, joint);
+    const FieldPath path{&at, "end_sites", e};
+    found.That(joint < joint_count, {&path, "joint"}, "expected the index of a joint",
+               ErrorCode::kOutOfRange, joint);
   }
   for (const bool is_right : {false, true}) {
     const LegInfo& leg = m.legs[is_right];
     for (const std::int16_t joint : {leg.hip, leg.knee, leg.ankle, leg.ball}) {
       found.That(joint >= -1 && std::cmp_less(joint, joint_count),
-                 At(at, is_right ? "right_leg" : "left_leg"),
-                 "expected the index of a joint, or -1", ErrorCode::kOutOfRange, joint);
+                 {&at, is_right ? "right_leg" : "left_leg"}, "expected the index of a joint, or -1",
+                 ErrorCode::kOutOfRange, joint);
     }
   }
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const WorldInfo& m) {
   const std::size_t count = m.rotation_quantizations.size();
-  found.That(count == 0 || count == m.skeleton.joints.size(), At(at, "rotation_quantizations"),
+  found.That(count == 0 || count == m.skeleton.joints.size(), {&at, "rotation_quantizations"},
              "expected one quantization per joint", ErrorCode::kShapeMismatch, count);
-  found.That(CheckRotationQuantizations(m.rotation_quantizations),
-             At(at, "rotation_quantizations"));
+  found.That(CheckRotationQuantizations(m.rotation_quantizations), {&at, "rotation_quantizations"});
   if (m.reduced_joints.empty()) return;
   std::vector<std::int16_t> parents;
   for (const JointInfo& joint : m.skeleton.joints) parents.push_back(joint.parent);
   // Reduced joints are allowed only with quantizations. Without parents, CheckReducedJoints fails.
   if (count == 0) parents.clear();
-  found.That(CheckReducedJoints(m.reduced_joints, parents), At(at, "reduced_joints"));
+  found.That(CheckReducedJoints(m.reduced_joints, parents), {&at, "reduced_joints"});
 }
 
 std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch) {
@@ -138,13 +110,13 @@ std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch) {
 
 void CheckMeaning(Findings& found, const FieldPath& at, const PoseBatch& m) {
   const PoseBatchInfo& info = m.info;
-  found.That(info.mode != PoseMode::kMovement, At(at, "mode"), "mode 2 (movement) has no poses",
+  found.That(info.mode != PoseMode::kMovement, {&at, "mode"}, "mode 2 (movement) has no poses",
              ErrorCode::kUnsupported);
   const bool has_all =
       IsCompact(info.mode)
           ? CompactPoseBytes(m).has_value()
           : m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count);
-  found.That(has_all, At(at, "poses"), "expected one pose per avatar", ErrorCode::kShapeMismatch,
+  found.That(has_all, {&at, "poses"}, "expected one pose per avatar", ErrorCode::kShapeMismatch,
              m.poses.size());
 }
 
@@ -152,40 +124,36 @@ void CheckMeaning(Findings& found, const FieldPath& at, const CurrentMovement& m
   const std::size_t count = m.keytimes_s.size();
   for (std::size_t k = 0; k < count; ++k) {
     const double keytime_s = m.keytimes_s[k];
-    found.That(k == 0 ? keytime_s == 0.0 : keytime_s >= m.keytimes_s[k - 1],
-               At(at, "keytimes_s", k), "expected keytimes that start at 0 and do not decrease");
+    found.That(k == 0 ? keytime_s == 0.0 : keytime_s >= m.keytimes_s[k - 1], {&at, "keytimes_s", k},
+               "expected keytimes that start at 0 and do not decrease");
   }
   found.That(m.generic_time <= static_cast<double>(std::max<std::size_t>(count, 1) - 1),
-             At(at, "generic_time"), "expected a time between 0 and the last keytime");
-  unsigned seen = 0;
-  for (const std::uint8_t name : m.parameter_names) {
-    CheckName(found, At(at, "parameter_names"), name, seen);
-  }
+             {&at, "generic_time"}, "expected a time between 0 and the last keytime");
   found.That(m.sites.empty() || m.sites.size() == m.weights.size() * m.parameter_names.size(),
-             At(at, "sites"), "expected one row of parameters per weight",
-             ErrorCode::kShapeMismatch, m.sites.size());
+             {&at, "sites"}, "expected one row of parameters per weight", ErrorCode::kShapeMismatch,
+             m.sites.size());
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const AvatarState& m) {
-  found.That(m.queue.size() <= m.queue_size, At(at, "queue"),
-             "expected at most queue_size requests", ErrorCode::kShapeMismatch, m.queue_size);
+  found.That(m.queue.size() <= m.queue_size, {&at, "queue"}, "expected at most queue_size requests",
+             ErrorCode::kShapeMismatch, m.queue_size);
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const Movements& m) {
   std::uint32_t before = 0;
   for (std::size_t i = 0; i < m.ends.size(); ++i) {
-    found.That(m.ends[i] >= before && m.ends[i] - before <= kMaxRecordBytes, At(at, "ends", i),
+    found.That(m.ends[i] >= before && m.ends[i] - before <= kMaxRecordBytes, {&at, "ends", i},
                "expected ends that do not decrease and records of at most 64 KiB");
     before = m.ends[i];
   }
-  found.That(before == m.records.size(), At(at, "records"),
+  found.That(before == m.records.size(), {&at, "records"},
              "expected as many bytes as the last end states", ErrorCode::kShapeMismatch,
              m.records.size());
 }
 
 void CheckMeaning(Findings& found, const FieldPath& at, const LibraryPiece& m) {
   found.That(m.offset <= m.total_bytes && m.bytes.size() <= m.total_bytes - m.offset,
-             At(at, "offset"), "expected a piece inside the library", ErrorCode::kOutOfRange,
+             {&at, "offset"}, "expected a piece inside the library", ErrorCode::kOutOfRange,
              m.offset);
 }
 

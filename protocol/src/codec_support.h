@@ -7,13 +7,13 @@
 /// Functions that the generated code (codec.cpp) calls for lists.
 namespace stridewire::protocol {
 
-void CheckList(Findings& found, const std::vector<ParameterValue>& list, const Bounds& bounds,
-               const FieldPath& at);
 template <typename T>
 void CheckList(Findings& found, const std::vector<T>& list, const Bounds& bounds,
                const FieldPath& at) {
   found.Count(list.size(), bounds, at);
-  for (std::size_t i = 0; i < list.size(); ++i) CheckFields(found, Entry(at, i), list[i]);
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    CheckFields(found, {at.parent, at.name, i}, list[i]);
+  }
 }
 
 template <typename W, typename T>
@@ -21,7 +21,8 @@ void UnpackList(Findings& found, const flatbuffers::Vector<W>* list, const Bound
                 const FieldPath& at, std::vector<T>& out) {
   out.resize(found.CountOf(list, bounds, at));
   for (std::size_t i = 0; i < out.size(); ++i) {
-    Unpack(found, Entry(at, i), *list->Get(static_cast<flatbuffers::uoffset_t>(i)), out[i]);
+    Unpack(found, {at.parent, at.name, i}, *list->Get(static_cast<flatbuffers::uoffset_t>(i)),
+           out[i]);
   }
 }
 

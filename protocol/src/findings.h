@@ -7,6 +7,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string_view>
 #include <type_traits>
@@ -20,23 +21,11 @@ namespace stridewire::protocol {
 /// Position of a field: a chain of names that begins with the message. It is converted to text only
 /// if an error is reported, so that successful checks allocate nothing.
 struct FieldPath {
+  static constexpr std::size_t kNoIndex = -1;
   const FieldPath* parent = nullptr;
   std::string_view name;
-  std::int64_t index = -1;  ///< Index of an entry, if the field is a list.
+  std::size_t index = kNoIndex;  ///< Index of an entry, if the field is a list.
 };
-
-[[nodiscard]] inline FieldPath At(const FieldPath& parent, std::string_view name) {
-  return {&parent, name, -1};
-}
-/// Returns the path of an entry of the list `name`.
-[[nodiscard]] inline FieldPath At(const FieldPath& parent, std::string_view name,
-                                  std::size_t index) {
-  return {&parent, name, static_cast<std::int64_t>(index)};
-}
-/// Returns the path of an entry of the list at `list`.
-[[nodiscard]] inline FieldPath Entry(const FieldPath& list, std::size_t index) {
-  return {list.parent, list.name, static_cast<std::int64_t>(index)};
-}
 
 /// Bounds of the length of a list or text, and the text of the error if they are exceeded.
 struct Bounds {
@@ -82,7 +71,21 @@ class Findings {
                const FieldPath& at) {
     const auto wrong = std::ranges::find_if_not(list, holds);
     if (wrong == list.end()) return;
-    Wrong(code, text, Entry(at, static_cast<std::size_t>(wrong - list.begin())));
+    Wrong(code, text, {at.parent, at.name, static_cast<std::size_t>(wrong - list.begin())});
+  }
+
+  /// Checks that the numbers `key(entry)` of a list are below `count`, which is at most 32, and
+  /// differ.
+  void Keys(const auto& list, auto key, unsigned count, const char* expected, const char* twice,
+            const FieldPath& at) {
+    std::uint32_t seen = 0;
+    for (const auto& entry : list) {
+      const unsigned number = std::invoke(key, entry);
+      That(number < count, at, expected, ErrorCode::kMalformed, number);
+      const std::uint32_t bit = 1u << (number % 32);
+      That((seen & bit) == 0, at, twice, ErrorCode::kMalformed, number);
+      seen |= bit;
+    }
   }
 
   /// Returns the number of entries to copy from a list of a message; 0 if there is no list. If the

@@ -111,15 +111,15 @@ class CppTest(unittest.TestCase):
 
     def test_checks_every_field(self):
         for line in (
-                'found.That(m.seq != 0, At(at, "seq"), "expected a number other than 0");',
-                'found.That(static_cast<unsigned>(m.color) <= 1, At(at, "color"), '
+                'found.That(m.seq != 0, {&at, "seq"}, "expected a number other than 0");',
+                'found.That(static_cast<unsigned>(m.color) <= 1, {&at, "color"}, '
                 '"expected a number from 0 to 1", ErrorCode::kMalformed, '
                 'static_cast<int>(m.color));',
-                'found.Text(m.text, {0, 16, "expected at most 16 bytes"}, At(at, "text"));',
+                'found.Text(m.text, {0, 16, "expected at most 16 bytes"}, {&at, "text"});',
                 'CheckList(found, m.items, {1, kMaxItems, "expected 1 to 65,536 entries"}, '
-                'At(at, "items"));',
+                '{&at, "items"});',
                 'if (m.speed_m_s) found.That(std::isfinite(*m.speed_m_s) && *m.speed_m_s >= 0, '
-                'At(at, "speed_m_s"), "expected a number of at least 0");'):
+                '{&at, "speed_m_s"}, "expected a number of at least 0");'):
             self.assertIn(line, self.source)
 
     def test_comments_state_ranges(self):
@@ -143,17 +143,37 @@ class CppTest(unittest.TestCase):
         }
         table Place { x: double; }""")).codec_source()
         for line in (
-                'm.part < m.parts, At(at, "part"), "expected a number below parts", '
+                'm.part < m.parts, {&at, "part"}, "expected a number below parts", '
                 'ErrorCode::kOutOfRange, m.part);',
-                'm.flags.size() == m.ids.size(), At(at, "flags"), "expected one entry per id", '
+                'm.flags.size() == m.ids.size(), {&at, "flags"}, "expected one entry per id", '
                 'ErrorCode::kShapeMismatch, m.flags.size());',
-                'm.token.empty() || m.token.size() >= 16, At(at, "token"), '
+                'm.token.empty() || m.token.size() >= 16, {&at, "token"}, '
                 '"expected 16 to 64 bytes, or none", ErrorCode::kLimitExceeded, m.token.size());',
-                '!m.moves || m.place, At(at, "moves"), "moves requires a place", '
+                '!m.moves || m.place, {&at, "moves"}, "moves requires a place", '
                 'ErrorCode::kMalformed);',
-                '!m.near || !m.exact, At(at, "exact"), "exact excludes near", '
+                '!m.near || !m.exact, {&at, "exact"}, "exact excludes near", '
                 'ErrorCode::kMalformed);'):
             self.assertIn("found.That(" + line, source)
+
+    def test_checks_keys_and_counts(self):
+        source = Cpp(read("""enum PaintName: ubyte { Red = 0, Green = 1 }
+        struct Amount (web: "Amounts") { value: double; name: ubyte (keys: "PaintName"); }
+        table Picture {
+          amounts: [Amount] (max: "2");
+          names: [ubyte] (keys: "PaintName", max: "2");
+          rows: ushort;
+          columns: ushort;
+          dots_m: [float] (max: "9", count: "columns * rows");
+        }""")).codec_source()
+        texts = '2, "expected a paint name from 0 to 1", "a paint occurs twice", '
+        for line in (
+                'found.That(std::isfinite(m.value), at, "expected a finite number");',
+                'found.Keys(m.amounts, &Amount::name, ' + texts + '{&at, "amounts"});',
+                'found.Keys(m.names, std::identity{}, ' + texts + '{&at, "names"});',
+                'found.That(m.dots_m.size() == std::size_t{1} * m.columns * m.rows, '
+                '{&at, "dots_m"}, "expected columns * rows dots", ErrorCode::kShapeMismatch, '
+                'm.dots_m.size());'):
+            self.assertIn(line, source)
 
     def test_decodes_and_encodes_renamed_and_inverted_members(self):
         self.assertIn("m.visible = !w.hidden();", self.source)
@@ -248,7 +268,7 @@ class VariantTest(unittest.TestCase):
 
     def test_copies_only_fields_that_the_type_uses(self):
         source = Cpp(read(VARIANT)).codec_source()
-        for line in ("  if (!m.at) found.That(std::isfinite(m.far), At(at, \"far\"), "
+        for line in ("  if (!m.at) found.That(std::isfinite(m.far), {&at, \"far\"}, "
                      "\"expected a finite number\");",
                      "  if (!w.at()) m.far = w.far();", "  m.high = w.high();",
                      "    case wire::Kind::Run: return Unpack(found, at, w, "
@@ -277,7 +297,7 @@ class VariantTest(unittest.TestCase):
 
     def test_web_client_converts_only_used_fields_to_json(self):
         json = TypeScriptCodec(read(VARIANT)).json()
-        self.assertIn("  if (m.type === 'hop' && !isEmpty(m.high)) json.high = m.high;", json)
+        self.assertIn("  if (m.type === 'hop' && m.high) json.high = m.high;", json)
 
 
 class TypeScriptTest(unittest.TestCase):

@@ -10,8 +10,6 @@ export const frameHeaderBytes = 16;
 const magic = 0x1a505753;  // "SWP", 0x1a
 const frameVersion = 1;
 const builder = new Builder(1024);
-const names = new Map<number, MessageName>(
-    Object.entries(MessageType).map(([name, type]) => [type, name as MessageName]));
 
 /** Returns the type number of the message in a frame. */
 export function typeOfFrame(frame: ArrayBuffer): number {
@@ -23,7 +21,7 @@ export function typeOfFrame(frame: ArrayBuffer): number {
 export function readMessage(frame: ArrayBuffer): Message {
   const bytes = new ByteBuffer(new Uint8Array(frame));
   bytes.setPosition(frameHeaderBytes);
-  return readers[names.get(typeOfFrame(frame))!](bytes);
+  return readers[typeOfFrame(frame)]!(bytes);
 }
 
 /**

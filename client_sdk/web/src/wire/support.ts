@@ -1,6 +1,6 @@
-import {ByteBuffer, type Builder} from 'flatbuffers';
+import {ByteBuffer} from 'flatbuffers';
 
-/** Functions that the generated code calls to read and build messages. */
+/** What the generated code uses to read messages. */
 
 /** Contains a table without fields at position 4. */
 export const absent = new ByteBuffer(Uint8Array.of(4, 0, 4, 0, 4, 0, 0, 0));
@@ -11,13 +11,4 @@ const decoder = new TextDecoder('utf-8', {ignoreBOM: true});
 
 export function text(bytes: string | Uint8Array | null): string {
   return bytes === null ? '' : decoder.decode(bytes as Uint8Array);
-}
-
-/** Builds a list of structs. Builders write backwards. */
-export function structs<T>(b: Builder, values: readonly T[],
-                           start: (b: Builder, count: number) => void,
-                           write: (value: T) => void): number {
-  start(b, values.length);
-  for (let i = values.length - 1; i >= 0; --i) write(values[i]!);
-  return b.endVector();
 }

@@ -22,8 +22,3 @@ export function toJson(m: Message, frame: ArrayBuffer): Json {
     })),
   };
 }
-
-/** Returns true if a field with the attribute `json_omit` is omitted. */
-export function isEmpty(value: unknown): boolean {
-  return !value || (Array.isArray(value) && value.length === 0);
-}
