@@ -96,7 +96,7 @@ class PoseRecording {
     const Decoded* before = nullptr;
     const Decoded* beyond = nullptr;
   };
-  /// Number of decoded ticks per stream. Playing in either direction needs four.
+  /// Maximum number of decoded ticks that are kept per stream. Each interpolation needs up to four.
   static constexpr std::size_t kMaxDecoded = 8;
 
   [[nodiscard]] std::size_t DecodedBytes() const;

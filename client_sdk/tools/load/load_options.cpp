@@ -190,8 +190,8 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
     line.text = app.version() + "\n";
     return line;
   } catch (const CLI::ParseError& error) {
-    // An unknown option is reported before a missing one. The text of an ExtrasError lists the
-    // arguments in reverse order.
+    // Reports an unknown option in preference to a missing one. Does not use the text of
+    // CLI::ExtrasError, which lists the arguments in reverse order.
     if (const auto surplus = app.remaining(); !surplus.empty()) {
       return Fail(ErrorCode::kInvalidArgument, "unknown option or surplus argument; see --help",
                   surplus.front());

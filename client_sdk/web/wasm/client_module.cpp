@@ -298,7 +298,8 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.client_name = hello.client_name;
   options.auth_token = hello.auth_token;
   options.max_commands = static_cast<std::size_t>(numbers[0]);
-  // When a session ends, each command adds a reply in one call, and no reply may be lost.
+  // When a session ends, one call adds the replies of all unanswered commands. The event queue must
+  // hold them all, because no reply may be lost.
   options.max_events += options.max_commands + Session::kMaxInspections;
   options.pose_history = static_cast<std::size_t>(numbers[1]);
   // An address has 32 bits here.
@@ -400,7 +401,7 @@ bool OnLibrary(Client* client, std::size_t hash_bytes, std::size_t bytes) {
   return is_valid;
 }
 
-/// `input` contains a text of `bytes` bytes. `bytes` may be 0.
+/// Calls Session::OnLost. `input` contains its text, whose length `bytes` may be 0.
 STRIDEWIRE_EXPORT(on_lost)
 void OnLost(Client* client, stridewire_status status, std::size_t bytes, double now_s) {
   const auto input = Input(bytes);

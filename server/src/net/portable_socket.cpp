@@ -18,7 +18,7 @@ void PortableSocket::Prepare(Traffic& traffic, std::size_t send_buffer_bytes) {
   // An error can be ignored, because the first read of the socket reports it as well.
   error_code ignored;
   socket_->set_option(asio::ip::tcp::no_delay(true), ignored);
-  socket_->non_blocking(true, ignored);  // Non-blocking mode is used for synchronous calls as well.
+  socket_->non_blocking(true, ignored);  // Synchronous calls must not block the thread either.
   if (send_buffer_bytes > 0) {
     socket_->set_option(asio::socket_base::send_buffer_size(static_cast<int>(send_buffer_bytes)),
                         ignored);

@@ -9,8 +9,8 @@
 
 #include "stridewire/client.h"
 
-/// C++17 wrapper of `stridewire/client.h`. It owns the handle and resizes buffers. The C header
-/// documents each function. The only exception that it throws is std::bad_alloc.
+/// C++17 wrapper of `stridewire/client.h`. It owns the handle and resizes buffers. It throws no
+/// exception except std::bad_alloc. The C header documents each function.
 namespace stridewire::client {
 
 /// Result of a call. Converts to true if the call succeeded.

@@ -37,8 +37,8 @@ export class CpuCrowdGeometry {
 
   /**
    * `capacity` is the number of avatars, `pointCount` the number of points per avatar. `indices`
-   * contains the lines or triangles of one avatar. If `flat`, each has the colour of its last
-   * point, without interpolation.
+   * contains the lines or triangles of one avatar. If `flat`, each line or triangle has the colour
+   * of its last point. Otherwise, colours are interpolated.
    */
   constructor(
     private readonly capacity: number, readonly pointCount: number,

@@ -53,7 +53,7 @@ export class Footprints {
     ++this.pendingUploads;
   }
 
-  /** Removes all, for example because the terrain has changed. */
+  /** Removes all footprints, for example because the terrain has changed. */
   clear(): void {
     this.next = 0;
     this.pendingUploads = 0;

@@ -28,7 +28,8 @@ struct Capture {
   Skeleton skeleton;  ///< Skeleton whose legs have both been identified.
   Clip clip;
   double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
-  /// False: no common unit fits the legs, so that `unit_m` was estimated from their length.
+  /// False: none of the usual units, such as the centimetre, gives legs of plausible length. The
+  /// reader has therefore estimated `unit_m` from the length of the legs.
   bool unit_is_common = true;
   BvhAxis up = BvhAxis::kPlusY;  ///< The up axis of the file, detected or given.
   UpSource up_source = UpSource::kOption;

@@ -107,7 +107,7 @@ GaitState MakeGaitState(double length_m, double rise_m, StepStyle style) {
   state.speed_mps = (on_stairs ? 0.95 : 1.08) * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
   // At free speed, double support takes 20 to 24 % of the stride (Perry and Burnfield, Gait
-  // Analysis), and more in slow walking. Here it is 21 % at 1.4 m/s and 35 % at 0.57 m/s.
+  // Analysis), and more in slow walking. Here it is 23 % at 1.4 m/s and 35 % at 0.57 m/s.
   const double share = on_stairs ? 0.12 : 0.220 - 0.105 * state.vigour;
   state.half_support_s = ToWholeFrames(share * state.step_s);
   STRIDEWIRE_CHECK(state.half_support_s > 0.0);

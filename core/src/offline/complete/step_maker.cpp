@@ -572,10 +572,11 @@ class StepGenerator {
   double end_s_ = 0.0;
   double stand_leg_m_ = 0.0;         // Distance from hip to ankle of the fixed leg in the stand.
   std::array<double, 2> reach_m_{};  // [Foot]: largest distance from hip to ankle.
-  HermiteCurve captured_;            // Has the ends and end velocities of the captured root.
-  HermiteCurve root_;                // Has the ends and end velocities of the generated root.
-  DVec3 outward_ = DVec3(0.0);       // Direction of a detour, away from the fixed foot.
-  std::vector<double> lowered_m_;    // Lowering of the root, evenly sampled from 0 to end_s_.
+  // Smooth paths of the root from its first to its last position, with its velocities there.
+  HermiteCurve captured_;          // In the captured stride.
+  HermiteCurve root_;              // In the generated step.
+  DVec3 outward_ = DVec3(0.0);     // Direction of a detour, away from the fixed foot.
+  std::vector<double> lowered_m_;  // Lowering of the root, evenly sampled from 0 to end_s_.
   double detour_m_ = 0.0;
   double lift_m_ = 0.0;
   PostureSample sample_;      // The captured stride at the current time.

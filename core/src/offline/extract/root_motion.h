@@ -11,7 +11,7 @@ namespace stridewire {
 struct GroundTravel {
   std::vector<DVec3> position_m;  ///< Horizontal path of the ground, one point per frame.
   double length_m = 0.0;  ///< Length of those parts of the path that have the speed of a walk.
-  /// Fraction of `length_m` during which the left foot is the supporting foot.
+  /// Fraction of `length_m` over which the left foot is the supporting foot.
   double left_share = 0.0;
 };
 

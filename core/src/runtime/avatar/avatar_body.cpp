@@ -111,7 +111,8 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScr
     movement.feet.packed = PackFootPlan(movement);
     return;
   }
-  // D = P - M, where P is the displayed pose.
+  // Sets the difference pose D = P - M, where P is the displayed pose, and M the blended pose of
+  // the new movement (paper, Eq. (5)).
   movement.feet.is_active = false;
   EvaluateBlend(group(), library->layout(), movement, movement.start_offset_s, cache,
                 movement.difference);

@@ -353,7 +353,7 @@ class Planner {
         lift.max_m =
             std::min(lift.max_m, (kMaxHoverM - raised_m - feet.LowestSole(at, foot)) / share);
       }
-      // If the foot would sink with one lift and hover with another, prefers the smaller lift.
+      // If no lift prevents both sinking and hovering, prefers the smaller of the two limits.
       const auto [least, most] = std::minmax(lift.min_m, lift.max_m);
       trajectory.settle_lift_m = std::clamp(stays ? 0.0 : std::max(least, 0.0), least, most);
     }
