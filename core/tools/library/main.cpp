@@ -257,7 +257,7 @@ int Run(int argc, char** argv) {
     const auto commands = app.get_subcommands();
     const std::string command = commands.empty() ? "" : commands.front()->get_name() + ": ";
     std::string what = error.what();
-    // The text of an ExtrasError lists the arguments in reverse order.
+    // The text of CLI::ExtrasError is not used, because it lists the arguments in reverse order.
     if (const auto surplus = app.remaining(true); !surplus.empty()) {
       what = surplus.front() + ": unknown option or surplus argument";
     }

@@ -16,8 +16,8 @@ inline constexpr double kClipFps = 120.0;
 /// 0.78 m in men who walked at their free speed.
 [[nodiscard]] double SteadyStepTime(double length_m);
 
-/// Returns the duration of a step whose feet differ in height by `rise_m`. People step more slowly
-/// on stairs and uneven ground.
+/// Returns the duration of a step in seconds. In the style kStairs, it increases with `rise_m`, the
+/// height difference of the feet, because people step more slowly on stairs and uneven ground.
 [[nodiscard]] double StepTime(double length_m, double rise_m, StepStyle style);
 
 /// Pitch of a foot while it rolls over its ball, as fractions of its pitch at toe-off. Rates are

@@ -226,9 +226,9 @@ void PelvisPath::StayWithinReach(const FootPaths& feet) {
     }
     const std::vector<double> smooth = MovingMean(MovingMaximum(missing, kMaximumHalf), weights);
     for (int i = 0; i < kSamples; ++i) {
-      // Steps follow each other in states, so the pelvis must not change there. After a turn, it
-      // may change at the end, because the rear foot does not have the direction assumed in the
-      // state.
+      // The pelvis is not lowered at both ends of a step, because successive steps have the same
+      // pose there. A step that turns may lower the pelvis at its end: its last pose differs from
+      // the first pose of the next step anyway, because the rear foot points in another direction.
       const int to_state = timing_.shape.turn_rad == 0.0 ? std::min(i, kSamples - 1 - i) : i;
       const auto k = static_cast<std::size_t>(i);
       lowered_m_[k] += smooth[k] * SmoothStep(to_state / (0.06 * (kSamples - 1)));

@@ -42,8 +42,8 @@ struct AvatarBody {
   /// Evaluates `pose` and `blended_pose` at a time of the movement.
   void Evaluate(double time_s);
 
-  /// Stores the data from which the next movement blends, which begins at `time_s` of this one.
-  /// Also evaluates `blended_pose` at `time_s`.
+  /// Stores the data from which the next movement blends. That movement begins at `time_s` of the
+  /// current one. Also evaluates `blended_pose` at `time_s`.
   void CaptureBlendSource(double time_s, bool keeps_speed);
 
   /// Uses the displayed pose at `time_s` as the blended pose. The next movement then blends from
@@ -61,8 +61,8 @@ struct AvatarBody {
   /// Makes the movement that was just started begin at `time_s` instead of 0.
   void SetStartOffset(double time_s);
 
-  /// Must follow StartWeighted, and SetStartOffset if it is called. Plans the feet of the movement
-  /// if they are planted, and computes the difference pose that fades out.
+  /// Plans the feet of the movement if they are planted, and computes the difference pose that
+  /// fades out. Call it after StartWeighted and, if the movement has a start offset, SetStartOffset.
   void BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch);
   void BlendIn(const LandingDecision& decision, bool keeps_speed, FootPlanScratch& scratch);
 

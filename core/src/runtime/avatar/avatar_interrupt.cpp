@@ -231,7 +231,8 @@ void AvatarSimulation::SwitchPlanting() {
     lock.height_m = 0.0;
     lock.normal = Vec3(0.0f, 1.0f, 0.0f);
     if (terrain != nullptr) continue;
-    // The ground is level, unless the feet stand on different steps of a staircase.
+    // Without a terrain, a small height difference of the balls is due to the roll of the feet, and
+    // a large one to different steps of a staircase (GroundRise).
     const double ball_height_m =
         BallPosition(skeleton, body_.pose, foot).y - rig.side(foot).ball_height_m;
     lock.print.position_m.y += GroundRise(ball_height_m - base_.position_m.y);

@@ -42,7 +42,8 @@ class AvatarReplica {
     double length_s = 0.0;     ///< Must be the same until all replicas receive new states.
     std::uint64_t number = 0;  ///< Must increase by 1 from tick to tick.
     bool has_poses = true;     ///< False: poses of this tick are not needed.
-    int ticks_apart = 1;       ///< Number of ticks between poses. Other ticks cost more.
+    /// Expected number of ticks between poses. Poses of other ticks are possible, but cost more.
+    int ticks_apart = 1;
     /// True: only poses with layers are needed, so movements without layers are not evaluated.
     bool only_layered = false;
   };
@@ -81,12 +82,13 @@ class AvatarReplica {
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
-  /// Changes whenever a record begins or sets a movement. A movement does not change meanwhile.
+  /// Changes whenever a record begins or sets a movement. While it stays the same, the movement
+  /// does not change.
   [[nodiscard]] std::uint32_t movement_number() const { return movement_number_; }
   /// Time at which the previous movement ended when this one began. Negative if the movement did
   /// not begin at the end of another one.
   [[nodiscard]] double previous_end_s() const { return previous_end_s_; }
-  /// Time since the start of the movement, of the last tick. Undefined while standing.
+  /// Time from the start of the movement to the last tick. Undefined while standing.
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// True if layers change the displayed pose.
   [[nodiscard]] bool has_layers() const { return may_have_layers_ && body_.has_layers; }
@@ -126,7 +128,7 @@ class AvatarReplica {
   // Poses of the movement, without layers, for times that are ahead_ticks_apart_ ticks apart.
   std::uint32_t ahead_count_ = 0;
   std::uint32_t ahead_ticks_apart_ = 1;
-  std::uint32_t ahead_tick_ = 0;       // Number of ticks since that of the first of these poses.
+  std::uint32_t ahead_tick_ = 0;  // Number of ticks since the tick of the first of these poses.
   std::vector<Quat> ahead_rotations_;  // [kPosesAhead][joint]
   std::array<Vec3, kPosesAhead> ahead_roots_m_ = {};
   double previous_end_s_ = -1.0;

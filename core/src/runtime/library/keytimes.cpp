@@ -136,8 +136,8 @@ double TimeWarp::TimeAt(double grid_position) const {
   for (std::size_t i = 1; i < n; ++i) {
     if (grid_position == knots_[i].position) return knots_[i].time_s;
   }
-  // Newton's method finds the time approximately. The bisection then evaluates the map only where
-  // this approximation does not decide.
+  // Newton's method usually finds the time with an error below kErrorS. In this case, the bisection
+  // evaluates the map only within kErrorS of the found time, and elsewhere only compares times.
   constexpr double kErrorS = 1e-9;
   std::size_t i = 0;
   while (knots_[i + 1].position < grid_position) ++i;

@@ -42,8 +42,9 @@ void BlendKeytimes(std::span<const double> example_keytimes_s, std::span<const f
                    std::span<double> out_s);
 
 /// Smooth map between time and grid position: the monotone cubic (PCHIP, Fritsch and Carlson 1980)
-/// through (K_i, u_i). The velocity of the piecewise linear map of Eq. (3) jumps at keytimes. This
-/// one is C1, maps keytimes to the same positions, and deviates by at most a few ms between them.
+/// through (K_i, u_i). The velocity of the piecewise linear map of Eq. (3) jumps at keytimes. The
+/// cubic map is C1, maps keytimes to the same positions, and deviates from the linear map by at
+/// most a few ms between them.
 ///
 ///   u_i = sum of the cells of the intervals before i; generic time g = i + (u - u_i) / cells_i
 class TimeWarp {

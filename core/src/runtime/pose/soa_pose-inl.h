@@ -78,7 +78,7 @@ void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::
 struct DifferenceState {
   bool is_any = false;
   bool is_any_inertial = false;
-  // True if every lane is eased and inertial. No results must be masked then.
+  // True if every lane is eased and inertial. In this case, no result needs a mask.
   bool are_all = false;
   Mask is_eased, is_inertial;
   Float fraction, half_s;
