@@ -242,7 +242,7 @@ for name in generated "$world"; do
     report_failure "the recorder of $name failed: $(tail -n 1 "$out/record_$name.log")"
   last_line="tail -n 1 $out/game_server_$name.log"
   if stop "game server of $name" 5; then
-    $last_line  # A summary of what it requested.
+    $last_line  # The game server prints a summary of its requests last.
   else
     report_failure "the game server of $name failed: $($last_line)"
   fi

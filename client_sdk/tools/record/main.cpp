@@ -104,8 +104,8 @@ int Run(int argc, char** argv) {
   } catch (const CLI::CallForVersion& version) {
     return app.exit(version);
   } catch (const CLI::ParseError& error) {
-    // An unknown option is reported before a missing one. The text of an ExtrasError lists the
-    // arguments in reverse order.
+    // Reports an unknown option in preference to a missing one. Does not use the text of
+    // CLI::ExtrasError, which lists the arguments in reverse order.
     if (const auto surplus = app.remaining(); !surplus.empty()) {
       return PrintError(surplus.front() + ": unknown option or surplus argument (see --help)",
                         kExitBadUsage);

@@ -61,8 +61,9 @@ inline constexpr std::size_t kMaxGaps = 1000;
 
 /// Records one avatar for `seconds` of server time, counted in ticks from the first received pose.
 /// If the server restarts, the recording continues when the avatar is back. Waits at most
-/// `timeout_s` for anything. Calls `progress`, unless it is empty, with the number of recorded
-/// seconds. Fails with kIo if there is no connection or no such avatar.
+/// `timeout_s` for the connection, for the avatar and for each pose. Calls `progress`, unless it is
+/// empty, with the number of recorded seconds. Fails with kIo if there is no connection or no such
+/// avatar.
 [[nodiscard]] Expected<Recording> Record(const Options& options,
                                          const std::function<void(double)>& progress);
 

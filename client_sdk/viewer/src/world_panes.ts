@@ -87,7 +87,7 @@ export class WorldPanes {
         this.updateButtons();
       }
     } catch {
-      // ConnectionStatus reports that there is no server.
+      // No message is shown here, because ConnectionStatus reports that the server is unreachable.
     }
   }
 

@@ -93,7 +93,7 @@ Expected<CommandLine> ReadCommandLine(int argc, const char* const* argv,
     result.text = std::string("stridewired ") + kVersion + "\n";
     return result;
   } catch (const CLI::ExtrasError&) {
-    // The text of the exception lists the arguments in reverse order.
+    // The text of the exception is not used, because it lists the arguments in reverse order.
     return Fail(ErrorCode::kInvalidArgument, "unknown option or surplus argument; see --help",
                 app.remaining().front());
   } catch (const CLI::ArgumentMismatch& error) {

@@ -94,7 +94,8 @@ export class StatisticsPanel {
       }
       this.metricsBefore = metrics;
     } catch {
-      this.metricsBefore = null;  // ConnectionStatus reports that there is no server.
+      // No message is shown here, because ConnectionStatus reports that the server is unreachable.
+      this.metricsBefore = null;
     } finally {
       this.fetching = false;
     }
