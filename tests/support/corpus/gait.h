@@ -41,7 +41,8 @@ struct WalkOptions {
   int steps = 6;
   int first_foot = 0;     ///< 0: left.
   double length_m = 0.6;  ///< Distance between successive footprints; negative walks backward.
-  double side_m = 0.0;    ///< If not 0: each foot moves sideways by this (positive is left).
+  /// If not 0, the figure walks sideways: distance that a foot moves in its step; positive is left.
+  double side_m = 0.0;
   double turn_rad = 0.0;  ///< Turn per step.
   double step_s = 0.6;
   double support_s = 0.15;  ///< Time with both feet on the ground.

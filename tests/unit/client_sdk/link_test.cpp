@@ -1,4 +1,4 @@
-// What a client displays over links that delay, stall and cut messages. Time is simulated.
+// Tests what a client displays over links that delay, stall and cut messages. Time is simulated.
 
 #include <gtest/gtest.h>
 

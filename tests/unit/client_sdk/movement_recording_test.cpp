@@ -20,7 +20,7 @@ constexpr double kStepS = 1.0 / 60.0;
 constexpr int kCrowd = 20;
 
 /// A view that observes a crowd with random requests in movement mode, and records it. The
-/// parameter says whether the world has compact poses.
+/// parameter is true if the world has compact poses.
 class MovementRecordingTest : public testing::TestWithParam<bool> {
  protected:
   MovementRecordingTest()

@@ -193,7 +193,7 @@ TEST(PoseHistory, ExtrapolatesUntilItStops) {
     EXPECT_EQ(sampled->index, 9u);
     EXPECT_FALSE(sampled->interpolated);
     EXPECT_EQ(sampled->extrapolated, i < 25) << i;
-    // The speed is that before the newest pose, and decreases.
+    // The speed is at first that before the newest pose, and then decreases.
     const float step_m = glm::length(root_m - last_m);
     EXPECT_LT(step_m, last_step_m);
     if (i == 1) {

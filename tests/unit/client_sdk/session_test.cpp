@@ -280,7 +280,7 @@ TEST_F(SessionTest, RestoresWorldsAndSubscriptionsAfterALostSession) {
   EXPECT_EQ(events[0].resumed, 0);
   EXPECT_EQ(events[2].command, request_command);  // the outcome is unknown
   EXPECT_EQ(events[2].status, STRIDEWIRE_SESSION_LOST);
-  EXPECT_EQ(events[3].world, world);  // the number of the application is unchanged
+  EXPECT_EQ(events[3].world, world);  // the application uses the same number as before
   EXPECT_EQ(events[4].command, observe_command);
   EXPECT_EQ(events[4].status, STRIDEWIRE_OK);
 }
@@ -861,7 +861,7 @@ TEST_F(SessionTest, ReturnsToTheServerThatCanResumeTheSession) {
   EXPECT_FALSE(Connect().resume_token.empty());
   EXPECT_EQ(session_->address_index(), 1u);
   session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
-  EXPECT_TRUE(session_->ConnectDue(now_s_));  // The other server, at once.
+  EXPECT_TRUE(session_->ConnectDue(now_s_));  // The session tries the other server at once.
   session_->StartConnecting(now_s_);
   EXPECT_EQ(session_->address_index(), 0u);
 }
@@ -872,7 +872,7 @@ TEST_F(SessionTest, MovesToTheNextAddressWhenTheServerShutsDown) {
   (void)Events();
   Receive(protocol::Goodbye{protocol::StatusCode::kShuttingDown, "see you"});
   EXPECT_LE(session_->NextTime() - now_s_, Backoff::kFirstS);
-  EXPECT_GT(session_->NextTime(), now_s_);  // Not all clients move at the same time.
+  EXPECT_GT(session_->NextTime(), now_s_);  // A random delay spreads the clients over time.
   EXPECT_TRUE(Connect().resume_token.empty());
   EXPECT_EQ(session_->address_index(), 1u);
   const auto events = Events();

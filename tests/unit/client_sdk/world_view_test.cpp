@@ -73,7 +73,7 @@ TEST_F(WorldViewTest, SamplesAllAvatarsAtATime) {
   DisplayCounts held;
   view_.SampleAll(60.5 / 60.0, crowd, held);
   EXPECT_EQ(crowd.avatars, (std::vector<std::uint32_t>{1, 2}));
-  // The first poses continue nothing.
+  // There are no earlier poses, so both avatars have a discontinuity.
   EXPECT_EQ(crowd.flags,
             (std::vector<std::uint8_t>{kCrowdDiscontinuity, kCrowdDiscontinuity | kCrowdStanding}));
   EXPECT_NEAR(crowd.roots_m[1].z, test_world::RootAt(60.5 / 60.0, 2).z, 1e-5f);
@@ -102,7 +102,8 @@ TEST_F(WorldViewTest, ModesAreIndependent) {
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1}));
 }
 
-// Absence from a batch of a region means nothing. After `left`, earlier batches are ignored.
+// A batch of a region need not contain all avatars of the region. After `left`, earlier batches are
+// ignored.
 TEST_F(WorldViewTest, AvatarsOfARegionStayUntilTheyLeave) {
   const auto partial = [&](std::uint64_t tick, const std::vector<test_world::AvatarAt>& avatars) {
     return Take(tick, avatars, 0, protocol::PoseMode::kFull, true);

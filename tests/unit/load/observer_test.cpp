@@ -246,7 +246,7 @@ TEST_F(ObserverTest, ReportsAnUnflaggedDiscontinuity) {
   connection_.SendBytes(frame_at(101, 0.2f, 0));
   connection_.SendBytes(frame_at(102, 9.0f, protocol::kPoseDiscontinuity));
   connection_.SendBytes(frame_at(103, 10.0f, 0));
-  connection_.SendBytes(frame_at(109, 11.0f, 0));  // Six ticks: as slow as that.
+  connection_.SendBytes(frame_at(109, 11.0f, 0));  // In six ticks, 1 m is not too fast.
   Sync();
   const ObserverCounts counts = Join();
   EXPECT_EQ(counts.poses_received, 5u);
@@ -354,7 +354,8 @@ TEST_F(ObserverTest, ExpectsAllPosesOneSecondAfterAReconnect) {
   Sync();
   const ObserverCounts counts = Join();
   const auto moment = static_cast<std::uint64_t>(Observer::kReconnectS * run_.tick_hz);
-  EXPECT_EQ(counts.poses_excused, 10 * 3 + moment);  // 101 to 110, and as much for the third
+  // Ticks 101 to 110 for all three avatars, and one second for avatar 3, which has not arrived.
+  EXPECT_EQ(counts.poses_excused, 10 * 3 + moment);
 }
 
 TEST_F(ObserverTest, ReportsALostConnectionOnce) {

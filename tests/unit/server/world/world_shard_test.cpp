@@ -239,7 +239,7 @@ TEST(WorldShard, CatchesUpOnMissedTicks) {
   ASSERT_TRUE(punctual.shard.Encode(PoseMode::kFull, 100, true, composer, a));
   ASSERT_TRUE(late.shard.Encode(PoseMode::kFull, 100, true, composer, b));
   EXPECT_EQ(*a.parts[0], *b.parts[0]);
-  // Events have the tick at which they happened, not the late one.
+  // Events contain the tick at which they happened, not the tick that a late shard advances to.
   const auto punctual_events = punctual.Events();
   const auto late_events = late.Events();
   EXPECT_GT(punctual_events.size(), 5u);

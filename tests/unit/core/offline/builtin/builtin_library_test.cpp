@@ -391,7 +391,7 @@ TEST(BuiltinLibrary, WalksWithNormalAngles) {
   }
   ASSERT_EQ(maxima.size(), 2u);
   EXPECT_NEAR(maxima[0], 14.0, 6.0);
-  EXPECT_NEAR(maxima[1], 75.0, 6.0);  // In captures at 75 %.
+  EXPECT_NEAR(maxima[1], 75.0, 6.0);  // In captures, this maximum is at 75 %.
 }
 
 // Segment masses and centres of Winter's table, independent of the code of the generator.

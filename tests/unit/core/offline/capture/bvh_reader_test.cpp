@@ -637,7 +637,8 @@ TEST(ParseBvh, OptionsOverrideDetection) {
 
   options = {};
   options.up = BvhAxis::kPlusZ;
-  EXPECT_NEAR(Read(text, options).clip.root_positions_m[11].y, 0.04 * 11, 1e-5);  // This was z.
+  // The z axis of the file becomes the y axis.
+  EXPECT_NEAR(Read(text, options).clip.root_positions_m[11].y, 0.04 * 11, 1e-5);
 
   options = {};
   options.left_ankle = "LeftFoot";

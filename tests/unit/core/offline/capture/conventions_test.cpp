@@ -70,7 +70,7 @@ TEST(Conventions, GivesAnEstimatedUnitTheCommonOneOfOtherFiles) {
                                         File("a", BvhAxis::kPlusY, UpSource::kRestPose),
                                         File("metres", BvhAxis::kPlusY, UpSource::kRestPose)};
   files[0].unit_is_common = false;
-  files[0].unit_m = 0.0085;  // Its legs are 1 m long in centimetres.
+  files[0].unit_m = 0.0085;  // With a unit of 1 cm, the legs would be 1 m long.
   files[2].unit_m = 1.0;
   const std::vector<AgreedConventions> agreed = AgreeOnConventions(files);
   ASSERT_TRUE(agreed[0].unit_m.has_value());

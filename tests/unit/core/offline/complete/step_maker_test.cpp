@@ -56,7 +56,8 @@ double AheadAt(const Walker& walker, const RawExample& example, double time_s) {
   return FootVector(walker.skeleton, pose, Foot::kLeft, 0.0).z;
 }
 
-// If it were ahead, its leg could not reach it, and the body would crouch.
+// If a generated foot were ahead of the captured one, the leg could not reach it unless the body
+// crouched.
 TEST(StepMaker, FeetDoNotArriveEarlierThanCapturedOnes) {
   Walker walker;
   StrideModel& stride = walker.person.strides[0];

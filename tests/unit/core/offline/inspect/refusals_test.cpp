@@ -109,7 +109,7 @@ TEST(Refusals, WalksThatDoNotArriveAreListed) {
   EXPECT_THAT(refusals[0].reason, HasSubstr("did not arrive: "));
 }
 
-// Every file that yields nothing gets a sentence.
+// There is a reason for every file without movements.
 TEST(ReasonForNoMovements, IsNeverEmptyForAnEmptyFile) {
   Extraction extraction{.frames = 1, .fps = 30.0};
   extraction.rejected = {{1.0, 2.0, "a short reason"}, {3.0, 7.0, "the main reason"}};

@@ -388,7 +388,7 @@ TEST(AvatarSimulation, MovesAlikeWhetherPosesAreEvaluatedOrNot) {
 }
 
 // A moving avatar is event-free between its events. A request that changes the current movement
-// ends that at once, and no event may occur while the avatar is event-free.
+// ends the event-free time at once. No event may occur while the avatar is event-free.
 TEST(AvatarSimulation, IsEventFreeOnlyWithoutEvents) {
   const auto library = OpenLibrary("builtin").value();
   AvatarSimulation avatar(library, {});

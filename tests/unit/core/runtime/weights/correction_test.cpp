@@ -106,8 +106,8 @@ TEST_P(InDimensions, ReachesRequestsInsideTheHull) {
       EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
     }
   }
-  // Otherwise there was nothing to correct. One in 600 random libraries has no error above 0.09 mm,
-  // but not all four.
+  // If no library had an error, the correction would not be tested. In one of 600 random libraries,
+  // no error exceeds 0.09 mm, so it is improbable that this holds for all four.
   EXPECT_GT(largest_m, 1e-4);
 }
 
