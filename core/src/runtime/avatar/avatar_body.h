@@ -62,7 +62,7 @@ struct AvatarBody {
   void SetStartOffset(double time_s);
 
   /// Plans the feet of the movement if they are planted, and computes the difference pose that
-  /// fades out. Call it after StartWeighted and, if the movement has a start offset, SetStartOffset.
+  /// fades out. Call it after StartWeighted, and after SetStartOffset if that is called.
   void BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch);
   void BlendIn(const LandingDecision& decision, bool keeps_speed, FootPlanScratch& scratch);
 
