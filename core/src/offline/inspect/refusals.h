@@ -26,10 +26,10 @@ struct Refusal {
   std::string reason;
 };
 
-/// Compares the movements of a synthesis with the requests in `input`. Returns, in the order of the
-/// requests, the steps, jumps and stands that miss their request by more than kMaxRequestErrorM or
-/// kMaxRequestErrorRad, the walks that did not arrive, and the steps and jumps that were skipped.
-/// These values are compared:
+/// Compares the movements of a synthesis with the requests in `input`. Returns the requests that
+/// were not met, in their order: walks that did not arrive, steps and jumps that were skipped, and
+/// steps, jumps and stands that differ from the request by more than kMaxRequestErrorM or
+/// kMaxRequestErrorRad. These values are compared:
 ///
 /// - Steps with `at`: the footprint. Other steps: position of the moving foot relative to the fixed
 ///   foot, in the heading after the step; direction of the moving foot's path; change of heading.

@@ -156,7 +156,8 @@ void AvatarSimulation::CaptureBlendSource(double time_s) {
 }
 
 // Records in change_, for replicas, that the avatar leaves the current movement at `time_s`. If
-// that movement began in the same Advance, replicas do not know it, so they need the whole state.
+// that movement began in the same Advance, replicas have not received it, so they need the whole
+// state.
 void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
   if (change_.has_left || change_.has_begun) {
     change_.needs_state = true;
@@ -181,8 +182,8 @@ bool AvatarSimulation::Redirect(PlanScratch& scratch) {
   const double phase = StepPhase();
   // While both feet stand, the next movement may start at once, so the step is not redirected.
   if (phase <= 1.0 || phase >= 2.0 - kLeastSwingLeft) return false;
-  // Without footprints, the plan depends on where the pose puts the standing foot. The pose of the
-  // last tick may not have been evaluated.
+  // If feet are not planted, the plan depends on the position of the standing foot in the current
+  // pose, which may not have been evaluated yet.
   if (!body_.plants_feet) body_.Evaluate(movement_time_s_);
   const auto redirection = PlanRedirection(phase);
   may_redirect_ = false;

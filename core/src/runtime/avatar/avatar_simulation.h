@@ -204,7 +204,7 @@ class AvatarSimulation {
   struct Redirection {
     RequestPlan plan;
     MovementRequest request;     // The requested step, or one that the avatar plans itself.
-    bool is_inserted = false;    // True if no request contains the step.
+    bool is_inserted = false;    // True if the avatar plans the step itself.
     bool ends_interrupt = true;  // False if the interrupting request starts after this step.
   };
 

@@ -7,7 +7,7 @@ namespace stridewire {
 namespace {
 
 constexpr double kTickS = 1.0 / 30.0;
-// A walk that takes longer than this is cancelled.
+// Maximum duration of a measured walk: one minute.
 constexpr int kMaxTicks = 60 * 30;
 // Lengths of walks that are long enough for steady strides between the first and the last steps.
 constexpr double kFastWalkM = 8.0;

@@ -58,7 +58,7 @@ class Harmonics {
     double square = 0.0;
     std::uint32_t state = seed;
     for (int multiple = first; multiple <= last; ++multiple) {
-      state = state * 1664525u + 1013904223u;  // Numerical Recipes
+      state = state * 1664525u + 1013904223u;  // The constants are those of Numerical Recipes.
       const double phase_rad = kTwoPi * (state >> 8) / (1 << 24);
       waves_.push_back({kTwoPi * multiple / kIdleLoopS, 1.0 / multiple, phase_rad});
       square += 0.5 / (static_cast<double>(multiple) * multiple);
