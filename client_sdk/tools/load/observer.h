@@ -31,9 +31,9 @@ struct ObserverCounts {
 
 /// A session that observes worlds, and counts and checks the poses.
 ///
-/// It checks that the world is known, that mode and number of joints are as requested, that ticks
-/// increase, that no avatar appears twice per tick, that poses can be decoded, and that no root
-/// moves faster than kMaxSpeedMPerS without the flag for a discontinuity.
+/// Checks of batches: the world is known, mode and number of joints are as requested, ticks
+/// increase, and no avatar appears twice per tick. Checks of poses: they can be decoded, and no
+/// root moves faster than kMaxSpeedMPerS without the flag for a discontinuity.
 class Observer final : public Session {
  public:
   static constexpr double kMaxSpeedMPerS = 15.0;

@@ -54,7 +54,7 @@ struct Recording {
   /// measured by the local clock. The frames of the gap repeat the last pose.
   std::vector<Restart> restarts;
   std::uint64_t bytes_received = 0;
-  std::string cut_short;  ///< Why the recording is shorter than requested. Empty: it is complete.
+  std::string cut_short;  ///< Reason why the recording is shorter than requested; empty: complete.
 };
 
 inline constexpr std::size_t kMaxGaps = 1000;

@@ -13,7 +13,7 @@ export interface WorldPane {
   randomWalkers: RandomWalkers | null;
   /** Ids of the avatars that this page has spawned. */
   readonly ownAvatars: Set<number>;
-  /** Why the server refused to let this page join the world. Empty if it did not. */
+  /** The server's reason for not letting this page join the world; empty if it has not refused. */
   refusal: string;
 }
 

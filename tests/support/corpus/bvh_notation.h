@@ -7,7 +7,7 @@
 
 namespace stridewire::test {
 
-/// How a motion is written as BVH. The default is the plainest form.
+/// Options for writing a motion as BVH. The defaults give the plainest form.
 struct BvhNotation {
   std::array<int, 3> rotation_order{2, 1, 0};  ///< Axes of the rotation channels; 0: x.
   std::array<int, 3> position_order{0, 1, 2};

@@ -153,7 +153,7 @@ class GaitRenderer {
     return leg;
   }
 
-  // How far the pelvis can be raised before an ankle is out of reach.
+  // Returns by how much the pelvis can be raised before an ankle is out of reach.
   double HighestPelvis(const FigurePose& pose) const {
     const double reach = kReach * figure_.LegLength();
     double highest = 2.0 * figure_.LegLength();

@@ -45,7 +45,7 @@ struct Rig {
 /// Returns a rig with one joint per part of the figure, whose root is the pelvis.
 [[nodiscard]] Rig MakeRig(const Figure& figure, const FigureMotion& motion);
 
-/// Where AddTwistJoints inserts joints.
+/// Places in which AddTwistJoints inserts joints.
 enum class TwistPlace {
   kInside,  ///< Between hip and knee and between knee and ankle.
   kBeside   ///< As additional children of the leg joints, without children of their own.
@@ -59,7 +59,7 @@ void AddFingers(Rig& rig);
 /// Removes a leg and everything below it.
 void RemoveLeg(int foot, Rig& rig);
 
-/// Which joints AddRoots adds above the hips.
+/// Joints that AddRoots adds above the hips.
 enum class Roots {
   kStatic,      ///< A joint that never moves.
   kRotated,     ///< A joint that never moves, rotated by -90 degrees about x, at some offset.
@@ -72,7 +72,7 @@ void AddRoots(Roots roots, Rig& rig);
 void AddPropInHand(Rig& rig);
 void AddSecondRoot(Rig& rig);
 
-/// How ReFrame turns the frame of each joint.
+/// Constant rotations by which ReFrame turns the frames of joints.
 enum class Frames {
   kLegsDown,    ///< Leg joints turned by 180 degrees about z: legs point up in the rest pose.
   kLegsAside,   ///< Leg joints turned by 90 degrees about y.

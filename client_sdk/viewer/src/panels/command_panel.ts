@@ -170,7 +170,7 @@ export class CommandPanel {
     }
     for (const [name, element] of this.layerButtons) setPressed(element, isPlaying(name));
   }
-  /** Activates the tool and deactivates the other one. If it is active, deactivates it. */
+  /** If the tool is active, deactivates it. Otherwise, activates it instead of the other tool. */
   toggleTool(tool: ClickTool): void {
     if (this.toolButtons[tool].hidden && this.tool !== tool) return;
     this.tool = this.tool === tool ? null : tool;

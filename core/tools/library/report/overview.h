@@ -15,10 +15,11 @@ struct Section {
   std::string html;
 };
 
-// The box at the top of the page: whether the library works, and what to do first if it does not.
+// Returns the box at the top of the page. It states whether the library passes the self-check, what
+// to do about each failure, and which movements are missing.
 [[nodiscard]] std::string VerdictHtml(const SelfCheck& check, const LibrarySummary& summary);
 
-// A list of links to the sections.
+// Returns a list of links to the sections.
 [[nodiscard]] std::string ContentsHtml(const std::vector<Section>& sections);
 
 [[nodiscard]] std::string SectionHtml(const Section& section);
@@ -28,7 +29,7 @@ struct Section {
 
 [[nodiscard]] Section SelfCheckSection(const SelfCheck& check);
 
-// The terms that the report uses.
+// Explains the terms that the report uses.
 [[nodiscard]] Section TermsSection();
 
 }  // namespace stridewire

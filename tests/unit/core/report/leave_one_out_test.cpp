@@ -46,8 +46,8 @@ TEST(LeaveOneOut, PlantingBringsCapturedStepsNearer) {
 TEST(LeaveOneOut, DoesNotUseTheLeftOutExample) {
   const auto library = OpenLibrary("builtin");
   ASSERT_TRUE(library.has_value());
-  // The nearest example is always another one. With a cluster diameter of 4 m, all others are
-  // averaged into one example.
+  // The nearest example is never the example that is left out. With a cluster diameter of 4 m, all
+  // other examples are averaged into one.
   const LeaveOneOut apart = MeasureLeaveOneOut(**library, 0, 0.0);
   const LeaveOneOut averaged = MeasureLeaveOneOut(**library, 0, 4.0);
   EXPECT_GT(apart.means[1].pose_m, 0.01);

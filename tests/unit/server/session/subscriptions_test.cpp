@@ -113,7 +113,7 @@ TEST(Subscriptions, PickTheRowsOfSelectedAvatars) {
   EXPECT_THAT(*all.PickRows(DeliveryOf({7, 8, 50})), ElementsAre(0, 1, 2));
 }
 
-// If a batch has no poses any more, one empty batch is needed to tell the client.
+// When no avatar has a pose any more, the client must receive one empty batch.
 TEST(Subscriptions, SendOneEmptyBatch) {
   Subscriptions all;
   all.Add(1, {.world = kWorld, .avatars = {2, 200}});

@@ -426,7 +426,8 @@ std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayDelayedCrowd(int sha
   AvatarBudget budget(100, 100);
   ThreadMetrics metrics;
   const auto world = Bench::MakeWorld();
-  world->avatar_options.idle_motion = false;  // The first pose that changes shows the start.
+  // Without idle motion, the first pose that changes belongs to the first movement.
+  world->avatar_options.idle_motion = false;
   std::map<AvatarId, std::vector<std::vector<std::byte>>> poses;
   for (int s = 0; s < shard_count; ++s) {
     WorldShard shard({.world = world,
@@ -551,7 +552,7 @@ TEST(WorldShard, EncodesOnlySelectedAvatars) {
   select(0, {});
   EXPECT_THAT(encoded(), ElementsAre(5));
   select(1, {});
-  // One delivery without poses tells observers about the change.
+  // Observers receive one delivery without poses, because the selection has changed.
   EXPECT_THAT(encoded(), ElementsAre());
   EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, false, composer, delivery));
   EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, true, composer, delivery));

@@ -383,7 +383,8 @@ TEST(LegFinder, RefusesAFigureOnHandsAndFeet) {
 }
 
 // In rigs whose joints have their x axis along the bone, the rest pose is a bundle of parallel
-// bones. Its hands are beside the feet, but it says nothing about how the figure stands.
+// bones. In this pose, the hands are beside the feet, but that does not mean that the figure stands
+// on them.
 TEST(LegFinder, AcceptsRigsWhoseBonesAreParallel) {
   FigureSketch figure;
   figure.Add("Hips", -1, Vec3(0.0f));

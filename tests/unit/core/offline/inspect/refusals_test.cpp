@@ -51,7 +51,7 @@ TEST(Refusals, RequestsInReachAreNotListed) {
 class TooLongSteps : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Refusals, TooLongSteps, testing::Values("false", "true"));
 
-// Whether they are skipped or the nearest step is played, the result is the same.
+// The list is the same whether the avatar skips the step or plays the nearest one.
 TEST_P(TooLongSteps, AreListedWithTheirResult) {
   const auto refusals = RefusalsOf(
       std::string(R"({"step":{"length_m":0.5}}, {"step":{"length_m":1.5,"allow_nearest":)") +
