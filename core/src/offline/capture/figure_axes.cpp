@@ -276,9 +276,9 @@ class AxesFinder {
     return sum / static_cast<double>(samples_.size());
   }
 
-  // Returns the horizontal direction of the feet in the frame of the root. This is the mean over
-  // the motion, or the direction in the rest pose if the motion has no clear direction. Its length
-  // is at most 2.
+  // Returns the horizontal direction of the feet in the frame of the root: the mean over the
+  // motion, or the direction in the rest pose if the motion has no clear direction. It is the sum
+  // of one vector per foot, each of length 1 at most.
   template <typename Level>
   DVec3 FindFeet(const Level& level) const {
     DVec3 feet(0.0);

@@ -17,7 +17,7 @@ struct Completion {
   int example_count = 0;  ///< Number of generated examples.
   /// True if the stand pose was composed because none was captured.
   bool has_composed_stand = false;
-  std::string stand_reason;  ///< Why the stillest captured pose is not a stand.
+  std::string stand_reason;  ///< Reason why the stillest captured pose is not a stand.
   /// True if the captures contain no level stride straight ahead. The generated steps then follow
   /// the strides of the library `builtin`.
   bool has_generic_strides = false;

@@ -232,8 +232,8 @@ void AvatarSimulation::SwitchPlanting() {
     lock.height_m = 0.0;
     lock.normal = Vec3(0.0f, 1.0f, 0.0f);
     if (terrain != nullptr) continue;
-    // Without a terrain, a small height difference of the balls is due to the roll of the feet, and
-    // a large one to different steps of a staircase (GroundRise).
+    // Without a terrain, the ground is at the height of the base, unless the ball is so far above
+    // or below its height on that ground that the foot must stand on another step of a staircase.
     const double ball_height_m =
         BallPosition(skeleton, body_.pose, foot).y - rig.side(foot).ball_height_m;
     lock.print.position_m.y += GroundRise(ball_height_m - base_.position_m.y);
