@@ -253,7 +253,7 @@ TEST_F(BuiltinStrideVariation, NeighboursFallOutOfStep) {
   EXPECT_GT(last - first, 0.1);
 }
 
-// Steps that must reach their footprint exactly neither change their duration nor their pose.
+// Stride variation changes neither the duration nor the pose of steps with exact placement.
 TEST_F(BuiltinStrideVariation, SparesExactSteps) {
   const auto bytes_of = [&](bool stride_variation) {
     AvatarSimulation avatar(library_, {},

@@ -69,7 +69,7 @@ std::vector<protocol::RequestItem> OnTheWire(protocol::AvatarId avatar) {
 
 struct Seen {
   Clip clip;
-  std::vector<bool> received;  // By frame; the others were missed and filled in.
+  std::vector<bool> received;  // [frame]: false if it was missed and interpolated.
 };
 
 // Returns the frame of the recording at which the choreography starts: the shift with the best

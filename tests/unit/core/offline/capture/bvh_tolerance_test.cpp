@@ -114,7 +114,7 @@ TEST(BvhTolerance, ReadsRowsThatContinueOnFurtherLines) {
   const Capture capture = Read(text);
   ExpectSameMotion(capture, Read(plain));
   EXPECT_THAT(capture.notes, Contains(HasSubstr("as in 11 more frames")));
-  // A number too many or too few is still found.
+  // Additional or missing numbers are still detected.
   EXPECT_THAT(ErrorOf(plain.substr(0, rows) + "1 2 3\n" + plain.substr(rows)),
               HasSubstr("fewer numbers"));
 }
