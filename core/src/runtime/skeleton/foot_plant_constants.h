@@ -82,7 +82,8 @@ inline constexpr double kAnkleLimitCosine = 0.7648421872844885;
 inline constexpr float kSmallestBoneM = 1e-3f;
 // The axis of a knee is the normal of the leg's plane if the sine of the knee's bend exceeds
 // kBentSine. A straighter knee has no reliable plane, so the knee's hinge (LegRig::Side::hinge) is
-// added with weight kReferenceWeight. Below kStraightSine it has its full weight.
+// added to the normal. The weight of the hinge rises from 0 at kBentSine to kReferenceWeight at
+// kStraightSine.
 inline constexpr float kStraightSine = 0.04f;
 inline constexpr float kBentSine = 0.14f;
 inline constexpr float kReferenceWeight = 0.1f;
