@@ -385,7 +385,7 @@ TEST_P(LinkTest, DelayIsShortOverASteadyLink) {
     Steps steps;
     simulation.Run(65.0, [&](const Frame& f) {
       if (f.local_s < 5.0) return;
-      // Beyond the mean latency. The simulated time has a resolution of kStepS.
+      // Delay in addition to the mean latency. The simulated time has a resolution of kStepS.
       longest_delay_s = std::max(longest_delay_s, f.local_s - f.render_s - 0.08 - 2.0 * kStepS);
       steps.Add(f);
     });

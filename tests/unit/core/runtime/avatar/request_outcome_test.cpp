@@ -121,8 +121,8 @@ TEST_F(RequestOutcomes, DoNotReportTakenRequests) {
   EXPECT_EQ(dropped[1].outcome, RequestOutcome::kRemoved);
 }
 
-// Whatever happens to an avatar, each accepted request has exactly one outcome, and no event with
-// its id follows.
+// Each accepted request has exactly one outcome, even if it is interrupted or cancelled, or if its
+// avatar teleports. No event with its id follows the outcome.
 TEST(RequestOutcome, IsReportedExactlyOnce) {
   constexpr int kAvatars = 24;
   constexpr int kTicks = 1500;
