@@ -53,8 +53,8 @@ class HttpServer {
   ~HttpServer();
 
   void AddPage(std::string path, Page page) { pages_[std::move(path)] = std::move(page); }
-  /// Sets the page for all paths that start with `prefix` and are not those of AddPage. It is
-  /// called on a separate thread.
+  /// Sets the page for all paths that start with `prefix` and are not those of AddPage. The server
+  /// calls `page` on a separate thread.
   void SetSlowPage(std::string prefix, Page page);
   /// Sets the page for all paths that have no other page.
   void SetFallback(Page page) { fallback_ = std::move(page); }

@@ -25,9 +25,10 @@ constexpr double kTiltRad = 1.5 * kDegree;
 // foot.
 constexpr double kMiddleShare = 0.5;
 
-// Horizontal positions of the pelvis at both ends of a step. Steps follow each other without a jump
-// only if both have the same pelvis in the state between them. The position therefore depends only
-// on the balls of the feet and on the state. The rear foot is assumed to be flat.
+// Horizontal positions of the pelvis at both ends of a step. Successive steps join without a jump
+// only if both have the same position of the pelvis in the state between them. The position
+// therefore depends only on the balls of the feet and on that state. The rear foot is assumed to be
+// flat.
 struct Ends {
   DVec3 start;
   DVec3 end;
