@@ -122,8 +122,10 @@ export class Session {
                accept: (number: number) => void = () => {}): void {
     this.run(() => {
       try {
-        const bytes = native().setInput(writeMessage(make()));
-        const code = native().call.command(this.client, world.handle, bytes);
+        const message = make();
+        const bytes = native().setInput(writeMessage(message));
+        const type = MessageType[message.type];
+        const code = native().call.command(this.client, world.handle, type, bytes);
         if (code !== 0) throw new StridewireError(code, webNames(native().text));
         const [command, number] = native().results;
         this.pending.set(command!, answer);

@@ -37,9 +37,8 @@ export function decodeMessage(frame: ArrayBuffer, sender = senderOf(typeOfFrame(
  * @throws Error the message does not follow protocol/STANDARD.md
  */
 export function encodeMessage(message: Message): ArrayBuffer {
-  const isClient = senderOf(MessageType[message.type]) === 'client';
   const bytes = native().call.encode_frame(
-      native().setInput(writeMessage({...message})), Number(isClient));
+      MessageType[message.type], native().setInput(writeMessage({...message})));
   if (bytes === 0) throw new Error(native().text);
   return native().bytes(native().results[0]!, bytes).buffer;
 }

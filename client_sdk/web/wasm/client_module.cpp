@@ -1,8 +1,8 @@
 // The functions of the WebAssembly module, which the web client calls. src/native.ts declares them.
 //
-// Messages are passed as frames (protocol/STANDARD.md). To send a command, the web client writes
-// its frame to the memory of `input`. To handle a received message, it first passes the frame to
-// `on_frame`, which verifies it, and then reads the fields from the frame. Numbers that a function
+// Received messages are passed as frames (protocol/STANDARD.md): the web client passes a frame to
+// `on_frame`, which verifies it, and then reads the fields from the frame. Of messages that the web
+// client makes, it passes the type and the payload. Numbers that a function
 // returns besides its result are in `results`; the comment of each function lists them after
 // "results:", each with its index. A text has results[kTextBytes] bytes and begins at address
 // results[kTextAt].
@@ -76,19 +76,17 @@ std::span<const std::byte> Input(std::size_t bytes) {
   return std::as_bytes(std::span(input_words)).first(bytes);
 }
 
-/// Decodes the frame in `input`. On error, sets the text.
-std::optional<protocol::Message> DecodeInput(std::size_t bytes, protocol::Sender sender) {
-  const auto frame = protocol::ParseFrame(Input(bytes), sender);
-  if (!frame) {
-    SetText(Describe(frame.error()));
-    return std::nullopt;
-  }
-  auto message = protocol::DecodeMessage(*frame);
-  if (!message) {
-    SetText(Describe(message.error()));
-    return std::nullopt;
-  }
-  return *std::move(message);
+/// Decodes a frame. On error, sets the text.
+std::optional<protocol::Message> Decode(const Expected<protocol::FrameView>& frame) {
+  auto message = frame ? protocol::DecodeMessage(*frame) : std::unexpected(frame.error());
+  if (message) return *std::move(message);
+  SetText(Describe(message.error()));
+  return std::nullopt;
+}
+
+/// Decodes a message whose payload is in `input`. On error, sets the text.
+std::optional<protocol::Message> DecodeInput(std::uint32_t type, std::size_t bytes) {
+  return Decode(protocol::FrameView{static_cast<protocol::MessageType>(type), Input(bytes)});
 }
 
 /// Opens the file of a library. Fails if its hash is not `hash`.
@@ -204,18 +202,17 @@ STRIDEWIRE_EXPORT(input) std::uint64_t* InputMemory(std::size_t bytes) {
 
 /// Checks the frame in `input`. Returns 1 if it is valid. Otherwise sets the text.
 STRIDEWIRE_EXPORT(check_frame) bool CheckFrame(std::size_t bytes, bool from_client) {
-  return DecodeInput(bytes, from_client ? protocol::Sender::kClient : protocol::Sender::kServer)
-      .has_value();
+  const auto sender = from_client ? protocol::Sender::kClient : protocol::Sender::kServer;
+  return Decode(protocol::ParseFrame(Input(bytes), sender)).has_value();
 }
 
-/// Decodes the frame in `input`, encodes its message as the native libraries do, and returns the
-/// size of the new frame in bytes. results: 0 the address of the new frame. If `input` contains no
-/// valid frame, returns 0 and sets the text.
-STRIDEWIRE_EXPORT(encode_frame) std::size_t EncodeFrame(std::size_t bytes, bool from_client) {
+/// Encodes the message in `input` as the native libraries do, and returns the size of the frame in
+/// bytes. results: 0 the address of the frame. If the message is invalid, returns 0 and sets the
+/// text.
+STRIDEWIRE_EXPORT(encode_frame) std::size_t EncodeFrame(std::uint32_t type, std::size_t bytes) {
   static std::vector<std::byte> frame;
   frame.clear();
-  const auto message =
-      DecodeInput(bytes, from_client ? protocol::Sender::kClient : protocol::Sender::kServer);
+  const auto message = DecodeInput(type, bytes);
   if (!message) return 0;
   if (const Status status = protocol::Encoder().Encode(*message, frame); !status) {
     SetText(Describe(status.error()));
@@ -234,7 +231,7 @@ std::int32_t DecodePoses(std::size_t info_bytes, std::size_t bytes) {
   static CrowdPose crowd;
   std::shared_ptr<const protocol::CompactCodecs> codecs;
   if (info_bytes > 0) {
-    auto message = DecodeInput(info_bytes, protocol::Sender::kServer);
+    const auto message = Decode(protocol::ParseFrame(Input(info_bytes), protocol::Sender::kServer));
     if (!message) return -1;
     const auto* info = std::get_if<protocol::WorldInfo>(&*message);
     if (info == nullptr) {
@@ -243,14 +240,9 @@ std::int32_t DecodePoses(std::size_t info_bytes, std::size_t bytes) {
     }
     codecs = WorldView::MakeCodecs(*info);
   }
-  const auto frame = protocol::ParseFrame(Input(info_bytes + bytes).subspan(info_bytes),
-                                          protocol::Sender::kServer);
-  auto message = frame ? protocol::DecodeMessage(*frame)
-                       : Expected<protocol::Message>(std::unexpected(frame.error()));
-  if (!message) {
-    SetText(Describe(message.error()));
-    return -1;
-  }
+  const auto message = Decode(protocol::ParseFrame(Input(info_bytes + bytes).subspan(info_bytes),
+                                                   protocol::Sender::kServer));
+  if (!message) return -1;
   const auto* batch = std::get_if<protocol::PoseBatch>(&*message);
   if (batch == nullptr) {
     SetText("expected a PoseBatch");
@@ -447,8 +439,9 @@ STRIDEWIRE_EXPORT(last_error) void LastError(Client* client) {
 /// `world`. Sets the text if the status is not OK. results: 0 the number of the command, or the
 /// nonce of an InspectAvatar; 1 the number of a new world or subscription.
 STRIDEWIRE_EXPORT(command)
-std::uint32_t Command(Client* client, stridewire_world world, std::size_t bytes) {
-  auto message = DecodeInput(bytes, protocol::Sender::kClient);
+std::uint32_t Command(Client* client, stridewire_world world, std::uint32_t type,
+                      std::size_t bytes) {
+  auto message = DecodeInput(type, bytes);
   if (!message) return STRIDEWIRE_INVALID_ARGUMENT;
   std::uint64_t command = 0;
   const stridewire_status status = std::visit(Submit{client->session, world, command}, *message);

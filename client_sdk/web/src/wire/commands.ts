@@ -1,5 +1,5 @@
 import type {MovementRequest, Observation, Region} from '../types';
-import type {PoseDetail, Region as RegionEntry} from '../../generated/messages';
+import type {PoseDetail} from '../../generated/messages';
 import * as check from './check';
 import type {Draft} from './frame';
 
@@ -30,14 +30,13 @@ export function observe(observation: Observation): Draft {
 }
 
 /** `beyond` is the detail of the observation, which applies beyond the rings of the region. */
-function region(asked: Region, beyond: PoseDetail): RegionEntry {
+function region(asked: Region, beyond: PoseDetail): check.Fields {
   check.object(asked, new check.Place('region'));
-  const {x, z, radiusM, leaveMarginM = null} = asked;
+  const {x, z, ...others} = asked;
   const rings = objects(asked.rings ?? [], 'rings');
   return {
+    ...others,
     centreM: [x, z],
-    radiusM,
-    leaveMarginM,
     rings,
     ringDetails: rings.some(({detail}) => detail !== undefined)
         ? rings.map(({detail}) => detail ?? beyond) : [],

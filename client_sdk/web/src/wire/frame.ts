@@ -1,14 +1,12 @@
 import {Builder, ByteBuffer} from 'flatbuffers';
 import {builders, readers} from '../../generated/codec';
-import {MessageType, type Message, type MessageName} from '../../generated/messages';
+import type {Message, MessageName} from '../../generated/messages';
 import {Place, type Fields} from './check';
 
 /** A message whose values have not been checked. */
 export type Draft = Fields & {readonly type: MessageName};
 
 export const frameHeaderBytes = 16;
-const magic = 0x1a505753;  // "SWP", 0x1a
-const frameVersion = 1;
 const builder = new Builder(1024);
 
 /** Returns the type number of the message in a frame. */
@@ -25,24 +23,15 @@ export function readMessage(frame: ArrayBuffer): Message {
 }
 
 /**
- * Writes a message as a frame. Properties may be absent if the schema states a default. Absent
- * `seq`, `world` and `subscription` are written as 1, because the WebAssembly module sets them in
- * commands.
+ * Writes a message and returns its payload, which is valid until the next call. Properties may be
+ * absent if the schema states a default. Absent `seq`, `world` and `subscription` are written as 1,
+ * because the WebAssembly module sets them in commands.
  * @throws Error a value has the wrong type, or does not fit into the type of its field. The
  *     WebAssembly module checks everything else.
  */
-export function writeMessage(message: Draft): Uint8Array<ArrayBuffer> {
+export function writeMessage(message: Draft): Uint8Array {
   builder.clear();
   builder.finish(builders[message.type](
       builder, {seq: 1, world: 1, subscription: 1, ...message}, new Place('')));
-  const payload = builder.asUint8Array();
-  const bytes = Math.ceil(payload.length / 8) * 8;
-  const frame = new Uint8Array(frameHeaderBytes + bytes);
-  const view = new DataView(frame.buffer);
-  view.setUint32(0, magic, true);
-  view.setUint16(4, frameVersion, true);
-  view.setUint16(6, MessageType[message.type], true);
-  view.setUint32(8, bytes, true);
-  frame.set(payload, frameHeaderBytes);
-  return frame;
+  return builder.asUint8Array();
 }
