@@ -274,7 +274,9 @@ class Cpp:
     def build_early(self, f):
         m = self.member(f)
         if f.is_list:
-            return f"const auto {f.name}_entries = Entries(b, {m});"
+            return (f"std::vector<Offset<wire::{f.type}>> {f.name}_entries;\n"
+                    f"  for (const auto& entry : {m}) "
+                    f"{f.name}_entries.push_back(Build(b, entry));")
         return f"const auto {f.name} = Build(b, {m});"
 
     def list_offset(self, f):
@@ -289,7 +291,8 @@ class Cpp:
             return f"b.CreateVectorOfNativeStructs<wire::{f.type}>({m}, ToWire)"
         if f.type in self.schema.tables:
             return f"b.CreateVector({f.name}_entries)" if "early" in f else \
-                f"b.CreateVector(Entries(b, {m}))"
+                (f"b.CreateVector<Offset<wire::{f.type}>>({m}.size(), "
+                 f"[&](std::size_t i) {{ return Build(b, {m}[i]); }})")
         numbers = f"reinterpret_cast<const {CPP_TYPES[f.type]}*>({m}.data())"
         return f"b.CreateVector({numbers}, {m}.size())"
 
@@ -551,8 +554,12 @@ class Cpp:
                     done.add(name)
             structs.append(self.struct(table))
         alternatives = ", ".join(self.type_name(m.name) for m in self.schema.messages)
-        return (self.head() + "#pragma once\n\n"
-                '#include "stridewire/protocol/message_parts.h"\n\n'
+        system = "".join(f"#include <{name}>\n" for name in (
+            "array", "cstddef", "cstdint", "optional", "span", "string", "variant", "vector"))
+        own = "".join(f'#include "stridewire/{name}.h"\n' for name in (
+            "base/error", "base/math", "base/rotation_quantization", "protocol/frame",
+            "protocol/message_parts", "protocol/pose_codec", "protocol/status_code"))
+        return (self.head() + f"#pragma once\n\n{system}\n{own}\n"
                 "namespace stridewire::protocol {\n\n" +
                 "\n".join(structs) +
                 f"\n/// Any message.\nusing Message = std::variant<{alternatives}>;\n"

@@ -26,13 +26,4 @@ void UnpackList(Findings& found, const flatbuffers::Vector<W>* list, const Bound
   }
 }
 
-/// Builds the tables of a list.
-template <typename T>
-auto Entries(FlatBufferBuilder& b, const std::vector<T>& list) {
-  std::vector<decltype(Build(b, list[0]))> entries;
-  entries.reserve(list.size());
-  for (const T& entry : list) entries.push_back(Build(b, entry));
-  return entries;
-}
-
 }  // namespace stridewire::protocol

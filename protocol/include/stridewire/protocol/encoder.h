@@ -2,11 +2,10 @@
 
 #include <cstddef>
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/base/math.h"
+#include "stridewire/protocol/frame.h"
 #include "stridewire/protocol/messages.h"
 
 namespace stridewire::protocol {

@@ -1,21 +1,6 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
-#include <optional>
-#include <span>
-#include <string>
-#include <variant>
-#include <vector>
-
-#include "stridewire/base/error.h"
-#include "stridewire/base/math.h"
-#include "stridewire/base/rotation_quantization.h"
-#include "stridewire/protocol/frame.h"
-#include "stridewire/protocol/limits.h"
-#include "stridewire/protocol/pose_codec.h"
-#include "stridewire/protocol/status_code.h"
 
 /// Names that the generated structs of messages use. Include messages.h instead.
 namespace stridewire::protocol {
