@@ -330,6 +330,8 @@ class TypeScriptCodec(TypeScript):
     def json_lines(self, table):
         properties = self.properties(table)
         for f in table.fields:
+            if "borrowed" in f:  # JSON has decoded poses, which include the other borrowed lists.
+                continue
             vector = self.vector_of(f)
             m = f"m.{vector}[{properties[vector].index(f)}]" if vector else f"m.{self.name_of(f)}"
             value = self.json_value(f, m)

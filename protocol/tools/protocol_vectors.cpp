@@ -5,7 +5,6 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "stridewire/base/version.h"
 #include "stridewire/protocol/encoder.h"
 #include "test_vectors.h"
 
@@ -27,33 +26,25 @@ void Write(const std::filesystem::path& path, std::string_view bytes) {
   if (!file) throw std::runtime_error("cannot write " + path.string());
 }
 
-void WriteVectors(const std::filesystem::path& folder) {
-  if (!std::filesystem::is_directory(folder)) {
-    throw std::invalid_argument(folder.string() + " is not a directory");
+int Run(int argc, char** argv) {
+  const std::string argument = argc > 1 ? argv[1] : "--help";
+  if (argument == "--help") {
+    std::cout << kHelp;
+    return argc == 2 ? 0 : 2;
   }
-  Encoder encoder;
+  if (argument == "--skeleton" && argc == 3) {
+    std::cout << ToJson(FromJson({{"type", argv[2]}, {"fields", nlohmann::json::object()}})).dump(1)
+              << "\n";
+    return 0;
+  }
+  const std::filesystem::path folder = argument;
   for (const auto& [name, message] : SampleMessages()) {
     std::vector<std::byte> frame;
-    if (const Status status = encoder.Encode(message, frame); !status) {
+    if (const Status status = Encoder().Encode(message, frame); !status) {
       throw std::runtime_error(name + ": " + Describe(status.error()));
     }
     Write(folder / (name + ".bin"), {reinterpret_cast<const char*>(frame.data()), frame.size()});
     Write(folder / (name + ".json"), ToJson(message).dump(1) + "\n");
-  }
-}
-
-int Run(int argc, char** argv) {
-  const std::string argument = argc > 1 ? argv[1] : "--help";
-  if (argument == "--version") {
-    std::cout << "protocol_vectors " << kVersion << "\n";
-  } else if (argument == "--help") {
-    std::cout << kHelp;
-    return argc == 2 ? 0 : 2;
-  } else if (argument == "--skeleton" && argc == 3) {
-    std::cout << ToJson(FromJson({{"type", argv[2]}, {"fields", nlohmann::json::object()}})).dump(1)
-              << "\n";
-  } else {
-    WriteVectors(argument);
   }
   return 0;
 }

@@ -1,6 +1,5 @@
 #include "test_vectors.h"
 
-#include <algorithm>
 #include <deque>
 #include <filesystem>
 #include <fstream>
@@ -129,14 +128,12 @@ const CompactCodecs& SampleCodecs() {
   return codecs;
 }
 
-std::vector<SampleMessage> SampleMessages() {
-  std::vector<SampleMessage> samples;
+std::map<std::string, Message> SampleMessages() {
+  std::map<std::string, Message> samples;
   for (const auto& entry : std::filesystem::directory_iterator(kFolder)) {
     const auto& path = entry.path();
-    if (path.extension() != ".json") continue;
-    samples.push_back({path.stem().string(), ReadVector(path.filename())});
+    if (path.extension() == ".json") samples.emplace(path.stem(), ReadVector(path.filename()));
   }
-  std::ranges::sort(samples, {}, &SampleMessage::name);
   return samples;
 }
 

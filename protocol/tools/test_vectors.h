@@ -1,8 +1,8 @@
 #pragma once
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <vector>
 
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
@@ -20,14 +20,9 @@ namespace stridewire::protocol {
 /// members have other types.
 [[nodiscard]] Message FromJson(const nlohmann::ordered_json& json);
 
-/// A message for a test vector. Most fields differ from their defaults.
-struct SampleMessage {
-  std::string name;  ///< File name of the vector, for example "request_crowd".
-  Message message;
-};
-
-/// Returns the messages of all test vectors, in alphabetical order.
-[[nodiscard]] std::vector<SampleMessage> SampleMessages();
+/// Returns the messages of all test vectors, by their file names, for example "request_crowd". Most
+/// fields differ from their defaults.
+[[nodiscard]] std::map<std::string, Message> SampleMessages();
 
 /// Returns the codecs for the compact poses of the vectors. Their parameters are those in the
 /// vector `world_info_detail`.

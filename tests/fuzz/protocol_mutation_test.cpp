@@ -164,8 +164,8 @@ TEST(ProtocolMutation, FramesAreRejectedOrValid) {
             << std::flush;
 
   std::vector<Bytes> frames;
-  for (const SampleMessage& sample : SampleMessages()) {
-    ASSERT_TRUE(Encoder().Encode(sample.message, frames.emplace_back()));
+  for (const auto& [name, sample] : SampleMessages()) {
+    ASSERT_TRUE(Encoder().Encode(sample, frames.emplace_back()));
   }
   Mutator mutator{std::mt19937_64(seed)};
   std::map<std::string, std::uint64_t> outcomes;
@@ -248,11 +248,9 @@ TEST(ProtocolMutation, PosesAreRejectedOrValid) {
     std::vector<Quat> rotations(codec.joint_count(), kIdentityQuat);
     CompactCodec::Block block;
     Bytes good(codec.pose_bytes());
-    for (const SampleMessage& sample : SampleMessages()) {
-      if (sample.name != name) continue;
-      PoseBatchReader reader(std::get<PoseBatch>(sample.message), &codec);
-      std::ranges::copy(reader.Next(), good.begin());
-    }
+    const Message sample = SampleMessages().at(name);
+    PoseBatchReader reader(std::get<PoseBatch>(sample), &codec);
+    std::ranges::copy(reader.Next(), good.begin());
     Vec3 root;
     ASSERT_TRUE(codec.Decode(good, root, rotations));
     std::uint64_t known = 0;

@@ -106,9 +106,9 @@ TEST(Decode, RejectsAPayloadOverItsCap) {
 }
 
 TEST(Decode, RejectsInvalidFlatBuffers) {
-  for (const SampleMessage& sample : SampleMessages()) {
-    SCOPED_TRACE(sample.name);
-    const MessageType type = TypeOf(sample.message);
+  for (const auto& [name, sample] : SampleMessages()) {
+    SCOPED_TRACE(name);
+    const MessageType type = TypeOf(sample);
     const std::string where(MessageTypeName(type));
     ExpectError(type, {}, ErrorCode::kMalformed, where);
     ExpectError(type, std::vector<std::byte>(8), ErrorCode::kMalformed, where);
@@ -118,17 +118,17 @@ TEST(Decode, RejectsInvalidFlatBuffers) {
 
 TEST(Decode, RejectsTruncatedPayloads) {
   // A truncated sample is rejected, unless only its padding is missing.
-  for (const SampleMessage& sample : SampleMessages()) {
-    SCOPED_TRACE(sample.name);
-    const MessageType type = TypeOf(sample.message);
-    const auto frame = EncodeOrFail(sample.message);
+  for (const auto& [name, sample] : SampleMessages()) {
+    SCOPED_TRACE(name);
+    const MessageType type = TypeOf(sample);
+    const auto frame = EncodeOrFail(sample);
     int refused = 0;
     for (std::size_t size = 0; size < frame.size() - kFrameHeaderBytes; ++size) {
       const std::vector<std::byte> cut(frame.begin() + kFrameHeaderBytes,
                                        frame.begin() + kFrameHeaderBytes + static_cast<long>(size));
       const auto message = DecodeMessage({type, cut});
       if (message) {
-        EXPECT_TRUE(SameMessage(*message, sample.message));
+        EXPECT_TRUE(SameMessage(*message, sample));
       } else {
         ++refused;
         EXPECT_EQ(message.error().code, ErrorCode::kMalformed);

@@ -20,10 +20,10 @@ struct Stream {
   std::vector<std::byte> bytes;
 
   explicit Stream(Sender sender) {
-    for (const SampleMessage& sample : SampleMessages()) {
-      const MessageType type = TypeOf(sample.message);
+    for (const auto& [name, sample] : SampleMessages()) {
+      const MessageType type = TypeOf(sample);
       if (!MaySend(sender, type)) continue;
-      const auto frame = EncodeOrFail(sample.message);
+      const auto frame = EncodeOrFail(sample);
       frames.push_back({type, {frame.begin() + kFrameHeaderBytes, frame.end()}});
       bytes.insert(bytes.end(), frame.begin(), frame.end());
     }

@@ -7,21 +7,21 @@ namespace stridewire::protocol {
 namespace {
 
 TEST(Messages, RoundTrip) {
-  for (const SampleMessage& sample : SampleMessages()) {
-    SCOPED_TRACE(sample.name);
-    const auto frame = EncodeOrFail(sample.message);
-    const auto decoded = Decode(frame, TypeOf(sample.message));
+  for (const auto& [name, sample] : SampleMessages()) {
+    SCOPED_TRACE(name);
+    const auto frame = EncodeOrFail(sample);
+    const auto decoded = Decode(frame, TypeOf(sample));
     ASSERT_TRUE(decoded) << Describe(decoded.error());
-    EXPECT_TRUE(SameMessage(sample.message, *decoded));
+    EXPECT_TRUE(SameMessage(sample, *decoded));
     EXPECT_EQ(EncodeOrFail(*decoded), frame);
   }
 }
 
 TEST(Messages, RoundTripThroughJson) {
-  for (const SampleMessage& sample : SampleMessages()) {
-    if (std::holds_alternative<PoseBatch>(sample.message)) continue;
-    SCOPED_TRACE(sample.name);
-    EXPECT_TRUE(SameMessage(FromJson(ToJson(sample.message)), sample.message));
+  for (const auto& [name, sample] : SampleMessages()) {
+    if (std::holds_alternative<PoseBatch>(sample)) continue;
+    SCOPED_TRACE(name);
+    EXPECT_TRUE(SameMessage(FromJson(ToJson(sample)), sample));
   }
 }
 
@@ -36,7 +36,7 @@ TEST(Messages, HaveASkeletonInJson) {
 
 TEST(Messages, HaveASampleOfEveryType) {
   std::set<std::size_t> alternatives;
-  for (const SampleMessage& sample : SampleMessages()) alternatives.insert(sample.message.index());
+  for (const auto& [name, sample] : SampleMessages()) alternatives.insert(sample.index());
   EXPECT_EQ(alternatives.size(), std::variant_size_v<Message>);
 }
 
@@ -44,10 +44,10 @@ TEST(Messages, AreAppendedToOneBuffer) {
   Encoder encoder;
   std::vector<std::byte> frames;
   std::size_t bytes = 0;
-  for (const SampleMessage& sample : SampleMessages()) {
+  for (const auto& [name, sample] : SampleMessages()) {
     EXPECT_EQ(frames.size() % kPayloadAlignment, 0u);
-    ASSERT_TRUE(encoder.Encode(sample.message, frames));
-    const auto alone = EncodeOrFail(sample.message);
+    ASSERT_TRUE(encoder.Encode(sample, frames));
+    const auto alone = EncodeOrFail(sample);
     ASSERT_EQ(frames.size(), bytes + alone.size());
     EXPECT_TRUE(std::equal(alone.begin(), alone.end(),
                            frames.begin() + static_cast<std::ptrdiff_t>(bytes)));
@@ -73,9 +73,9 @@ TEST(Messages, RequestsAllowTheNearestMovementOnlyIfTheyDoNotSayOtherwise) {
     }
   }
   int steps = 0;
-  for (const SampleMessage& sample : SampleMessages()) {
-    if (sample.name != "request_footprints" && sample.name != "request_refusals") continue;
-    const auto old = Decode(EncodeOrFail(sample.message), MessageType::kRequest);
+  for (const auto& [name, sample] : SampleMessages()) {
+    if (name != "request_footprints" && name != "request_refusals") continue;
+    const auto old = Decode(EncodeOrFail(sample), MessageType::kRequest);
     ASSERT_TRUE(old);
     for (const RequestItem& item : std::get<Request>(*old).items) {
       const auto* step = std::get_if<StepMovement>(&item.movement);
@@ -88,10 +88,10 @@ TEST(Messages, RequestsAllowTheNearestMovementOnlyIfTheyDoNotSayOtherwise) {
 }
 
 TEST(Messages, APoseBatchBorrowsItsFrame) {
-  for (const SampleMessage& sample : SampleMessages()) {
-    const auto* batch = std::get_if<PoseBatch>(&sample.message);
+  for (const auto& [name, sample] : SampleMessages()) {
+    const auto* batch = std::get_if<PoseBatch>(&sample);
     if (batch == nullptr || batch->avatars.empty()) continue;
-    const auto frame = EncodeOrFail(sample.message);
+    const auto frame = EncodeOrFail(sample);
     const auto decoded = Decode(frame, MessageType::kPoseBatch);
     ASSERT_TRUE(decoded);
     const auto& poses = std::get<PoseBatch>(*decoded).poses;

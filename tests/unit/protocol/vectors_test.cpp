@@ -44,11 +44,11 @@ TEST(Vectors, DecodeToTheirJson) {
 
 TEST(Vectors, EqualTheSampleMessages) {
   std::set<std::string> samples;
-  for (const SampleMessage& sample : SampleMessages()) {
-    SCOPED_TRACE(sample.name);
-    samples.insert(sample.name);
-    const auto frame = EncodeOrFail(sample.message);
-    EXPECT_EQ(Read(kDirectory / (sample.name + ".bin")),
+  for (const auto& [name, sample] : SampleMessages()) {
+    SCOPED_TRACE(name);
+    samples.insert(name);
+    const auto frame = EncodeOrFail(sample);
+    EXPECT_EQ(Read(kDirectory / (name + ".bin")),
               std::string(reinterpret_cast<const char*>(frame.data()), frame.size()))
         << "run protocol_vectors, if the wire was meant to change";
   }

@@ -7,18 +7,16 @@ export type Json = {[name: string]: any};
 
 /** Converts a message to the JSON of protocol/vectors, which uses the names of the schema. */
 export function toJson(m: Message, frame: ArrayBuffer): Json {
-  const json = toFields[m.type](m as never);
-  if (m.type !== 'PoseBatch') return json;
-  const {rootsM, rotations} = decodePoses(frame, vectorInfo());
-  const {avatars: _, flags: _flags, ...fields} = json;
-  return {
-    ...fields,
-    poses: Array.from(m.avatars, (avatar, i) => ({
+  const json: Json = toFields[m.type](m as never);
+  if (m.type === 'PoseBatch') {
+    const {rootsM, rotations} = decodePoses(frame, vectorInfo());
+    json.poses = Array.from(m.avatars, (avatar, i) => ({
       avatar, flags: m.flags[i], root_position_m: [...rootsM.subarray(3 * i, 3 * i + 3)],
       rotations: Array.from({length: m.jointCount}, (_joint, j) => {
         const at = 4 * (i * m.jointCount + j);
         return [...rotations.subarray(at, at + 4)];
       }),
-    })),
-  };
+    }));
+  }
+  return json;
 }
