@@ -603,7 +603,7 @@ StepGenerator ForwardGenerator(const Person& person, const StepSpec& step) {
 }
 
 std::vector<double> KeytimesOf(const StepSpec& step, const StepGenerator& forward) {
-  const std::vector<double> keys = forward.Keytimes();
+  std::vector<double> keys = forward.Keytimes();
   if (!step.is_backward) return keys;
   std::vector<double> reversed;
   for (const double key : std::views::reverse(keys)) {
