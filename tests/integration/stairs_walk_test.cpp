@@ -24,7 +24,7 @@ constexpr double kMaxSwingM = 0.2;  // Above the higher one of the two footprint
 constexpr double kMaxKneeDeg = 120.0;
 constexpr double kMaxKneeDegPerS = 800.0;
 constexpr double kMaxAnkleDeg = 50.0;
-constexpr double kMaxAcceleration = 17.0;       // Of the pelvis, vertical, in m/s².
+constexpr double kMaxAcceleration = 17.0;       // Of the pelvis, vertical, in m/s^2.
 constexpr double kMaxUsualAcceleration = 10.0;  // The same in 99 % of all frames.
 constexpr std::size_t kAveragedFrames = 5;
 // People take one tread at a time if two are higher than this.
@@ -173,7 +173,7 @@ TEST_P(StairsWalk, StaysWithinHumanLimits) {
     motion.climb_m = LargestClimb(synthesis);
     std::printf(
         "%4.1f x %4.1f cm: feet swing up to %4.1f cm above footprints, knees %5.1f deg, %4.0f "
-        "deg/s, ankles %4.1f deg, pelvis %4.1f m/s2, usually below %4.1f, steps climb up to %4.1f "
+        "deg/s, ankles %4.1f deg, pelvis %4.1f m/s^2, usually below %4.1f, steps climb up to %4.1f "
         "cm\n",
         1e2 * flight.rise_m, 1e2 * flight.tread_m, 1e2 * motion.swing_m, motion.knee_deg,
         motion.knee_deg_per_s, motion.ankle_deg, motion.acceleration, motion.usual_acceleration,

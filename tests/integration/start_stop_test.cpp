@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kFps = 60.0;
 // The horizontal acceleration of the pelvis is averaged over this number of frames. In captures of
-// starts and stops it is at most 4.6 m/s².
+// starts and stops it is at most 4.6 m/s^2.
 constexpr std::size_t kAveragedFrames = 5;
 constexpr double kMaxAcceleration = 6.0;
 
@@ -63,7 +63,7 @@ TEST_P(StartStop, AcceleratesGently) {
     const auto walk = Synthesize({.library = library, .requests = requests, .fps = kFps});
     ASSERT_TRUE(walk.has_value()) << Describe(walk.error());
     const double largest = LargestAcceleration(walk->clip);
-    std::printf("%s, steps of %.2f m: pelvis acceleration at most %.1f m/s2\n", GetParam().name,
+    std::printf("%s, steps of %.2f m: pelvis acceleration at most %.1f m/s^2\n", GetParam().name,
                 length_m, largest);
     EXPECT_LT(largest, kMaxAcceleration) << "steps of " << length_m << " m";
   }

@@ -12,7 +12,7 @@ namespace {
 
 // Maximum acceleration of the root in the blend from the previous pose, unless the blend would then
 // take longer than kMaxApproachS. In captures of starts and stops, the acceleration of blend and
-// movement together is 4 to 4.6 m/s2.
+// movement together is 4 to 4.6 m/s^2.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
 constexpr double kMaxApproachS = 0.8;
 // Vertical accelerations have a smaller weight, because climbing legs push the body up.
