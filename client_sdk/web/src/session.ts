@@ -21,7 +21,7 @@ const cacheTimeoutS = 5;
 const states: readonly ClientState[] =
     ['idle', 'waiting', 'connecting', 'handshake', 'ready', 'closing', 'closed'];
 const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
-/** Messages with contents that the module leaves to this class. */
+/** Messages that the module processes only in part. `onMessage` processes the rest. */
 const userMessages: readonly number[] = [MessageType.WorldInfo, MessageType.Events];
 /** Results of `state`. */
 const networkNames = [
@@ -79,7 +79,7 @@ export class Session {
     finalizers.register(this, this.client);
   }
 
-  // ---- Calls of the user.
+  // ---- Methods that the application calls.
 
   /** Starts to connect. Does nothing if already open. `addressIndex` is an index in `urls`. */
   open(nowS: number, urls: readonly string[] = ['']): void {
@@ -180,7 +180,7 @@ export class Session {
     this.interpolationDelayS += (newestS - timeS - this.interpolationDelayS) / 16;
   }
 
-  // ---- Calls of the network. Times must not decrease.
+  // ---- Methods that the network calls. Times must not decrease.
 
   /**
    * Returns what the network needs to know; bools are 0 or 1. `nextTimeS`: time at which to call
@@ -383,7 +383,7 @@ export class Session {
     if (accepted && userMessages.includes(type)) this.onMessage(read());
   }
 
-  /** Handles the parts of messages that the module leaves to this class. */
+  /** Processes the parts of messages that the module does not process. */
   private onMessage(message: Message): void {
     if (message.type === 'Events') {
       this.onEvents(message);

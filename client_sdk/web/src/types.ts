@@ -81,7 +81,7 @@ export interface Reply {
 
 /** Result of one item of a command. */
 export interface ReplyItem extends messages.ReplyItem {
-  /** Name of the code. */
+  /** Name of `code`, for example `no_such_avatar`. */
   readonly status: string;
 }
 

@@ -41,7 +41,7 @@ class WorldDirectory {
   [[nodiscard]] Outcome<std::shared_ptr<const WorldTerrain>> SetTerrain(
       World& world, std::optional<protocol::TerrainInfo>&& terrain);
 
-  /// Removes worlds without members and avatars. Returns their ids.
+  /// Removes worlds that have neither members nor avatars. Returns their ids.
   [[nodiscard]] std::vector<WorldId> DropEmpty();
 
   /// Calls `function(const World&)` for each world, in the order of names.

@@ -251,7 +251,8 @@ class EncodedPoseCache {
   std::shared_ptr<PoseScratch> scratch_;
   const protocol::CompactCodecs* codecs_;
   std::vector<Mode> modes_;
-  // Size of a pose in all modes together: whole cache lines, or one root position.
+  // Number of bytes per pose in a plane: the encodings in all modes, padded to whole cache lines.
+  // If there are no modes, only the root position is stored.
   std::size_t pose_bytes_;
   std::size_t uncompressed_bytes_;
   int steps_apart_ = 1;

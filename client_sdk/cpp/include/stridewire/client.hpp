@@ -71,7 +71,8 @@ inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id
   m.heading_rad = heading_rad.value_or(0.0);
   return m;
 }
-/// Changes a step request so that the server rejects it unless the foot lands exactly at its place.
+/// Changes a step request so that the server rejects it if the foot cannot land exactly on the
+/// requested footprint.
 inline stridewire_movement ExactOnly(stridewire_movement step) {
   step.exact_only = 1;
   return step;

@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-/// Kind of an error, for code that reacts to it. For users, Describe() returns a text.
+/// Kind of an error. Code can react to the kind; Describe() returns a text for users.
 enum class ErrorCode : std::uint8_t {
   kInvalidArgument,  ///< A value is invalid regardless of the state of the object.
   kOutOfRange,       ///< A number is outside its documented range or not finite.

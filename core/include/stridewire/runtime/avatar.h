@@ -29,7 +29,7 @@ enum class AvatarEventType : std::uint8_t {
   kDropped,
 };
 
-/// How a request ended.
+/// How a request ended. The comments begin with the type of the event that reports the outcome.
 enum class RequestOutcome : std::uint8_t {
   kNone,       ///< The request has not ended.
   kCompleted,  ///< kFinished: the movement was played to its end, or the walk has arrived.

@@ -43,7 +43,9 @@ std::vector<double> SitesOf(const MotionGroup& group, std::span<const int> examp
   return sites;
 }
 
-// Inverse of [R + ridge I, A; A^T, 0]. Its first columns contain r and a.
+// Solves the equations of Smoothness. `inverse` is the inverse of [R + ridge I, A; A^T, 0], where R
+// and A contain one row per site: R(p) and A(p) at the site. The first columns of the inverse, one
+// per site, contain r, and below it a.
 struct Kriging {
   std::vector<double> sites;  // [site][d]
   std::vector<double> scales;

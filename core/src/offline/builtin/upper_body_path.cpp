@@ -54,7 +54,8 @@ Curve PerStride(const StepTiming& timing, const Oscillation& start, const Oscill
   return Curve(knots);
 }
 
-// Creates a curve with one period per step. `middle_offset` is added halfway.
+// Creates a curve with one period per step. It is middle + amplitude at both ends, and middle -
+// amplitude in between. `middle_offset` is added to the value in between.
 Curve PerStep(const StepTiming& timing, const Oscillation& start, const Oscillation& end,
               double middle_offset = 0.0) {
   const double low = 0.5 * (start.middle + end.middle - start.amplitude - end.amplitude);

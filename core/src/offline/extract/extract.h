@@ -91,7 +91,9 @@ struct Extraction {
   struct Stand {
     /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
     Pose pose;
-    double unrest = 0.0;  ///< Deviation from standing still and upright.
+    /// Deviation from standing still and upright: the mean speed of the joints in m/s, plus
+    /// penalties for feet that are apart or tilted, for crouching and for leaning.
+    double unrest = 0.0;
     /// Sum of the height differences between the points of the feet and those of flat feet.
     double tilt_m = 0.0;
   };

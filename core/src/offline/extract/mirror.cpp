@@ -23,7 +23,7 @@ struct MirroredBone {
 };
 
 DVec3 Mirrored(const DVec3& v) { return {-v.x, v.y, v.z}; }
-// Returns M q M.
+// Returns M q M, where M is the reflection x -> -x (SkeletonMirror).
 DQuat Mirrored(const DQuat& q) { return {q.w, q.x, -q.y, -q.z}; }
 
 std::vector<DQuat> WorldRotations(const Skeleton& skeleton, ConstPoseSpan pose) {

@@ -37,8 +37,8 @@ double StandHeight(const BodyTracks& tracks) {
 }
 
 // Returns the deviation from an upright posture, in which the pelvis is above the ankles and the
-// highest joint is above the pelvis. People are also still in a crouch before a jump, or while they
-// reach for a bar.
+// highest joint is above the pelvis. A still pose need not be upright: people are also still in a
+// crouch before a jump, or while they reach for a bar.
 double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   const DVec3 pelvis(positions[0]);
   const auto at = [&](int joint) { return DVec3(positions[static_cast<std::size_t>(joint)]); };
@@ -49,8 +49,8 @@ double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   return HorizontalDistance(pelvis, ankles) + HorizontalDistance(DVec3(*top), pelvis);
 }
 
-// Returns how far a foot is from being flat. People are also still on their heels or toes, for
-// example after a fall.
+// Returns how far a foot is from being flat. Still feet need not be flat: people also rest on their
+// heels or toes, for example after a fall.
 double Tilt(const FootPaths& foot, int frame) {
   double tilt_m = 0.0;
   for (const std::size_t point : {FootPaths::kAnkle, FootPaths::kToeTip}) {
