@@ -9,8 +9,7 @@
 namespace stridewire::client {
 
 void MovementRecording::Add(protocol::AvatarId avatar, const PoseStamp& stamp,
-                            const AvatarReplica& replica,
-                            const std::shared_ptr<const PlayedMovement>& movement,
+                            const std::shared_ptr<const PlayedMovement>& movement, double time_s,
                             const std::shared_ptr<const MotionLibrary>& library, double tick_s,
                             Cursor& cursor) {
   if (library_ != library) {
@@ -20,13 +19,11 @@ void MovementRecording::Add(protocol::AvatarId avatar, const PoseStamp& stamp,
   // The time differs if the server has skipped ticks.
   constexpr double kMaxDifferenceS = 1e-6;
   const std::uint64_t ticks = stamp.tick - cursor.begin_tick;
-  if (cursor.recording == number_ && cursor.movement == replica.movement_number() &&
+  if (cursor.recording == number_ && cursor.movement == movement->number &&
       cursor.standing == stamp.standing && !stamp.discontinuity && ticks < kMaxTicks &&
-      std::fabs(cursor.begin_s + static_cast<double>(ticks) * tick_s - replica.movement_time_s()) <
-          kMaxDifferenceS) {
+      std::fabs(cursor.begin_s + static_cast<double>(ticks) * tick_s - time_s) < kMaxDifferenceS) {
     return;
   }
-  STRIDEWIRE_CHECK(movement != nullptr && movement->number == replica.movement_number());
   const Movement& of = movement->movement;
   const std::size_t bytes = sizeof(Span) + sizeof(PlayedMovement) +
                             of.weights.size() * sizeof(float) +
@@ -35,16 +32,16 @@ void MovementRecording::Add(protocol::AvatarId avatar, const PoseStamp& stamp,
   spans_.push_back({.avatar = avatar,
                     .flags = CrowdFlagsOf(stamp),
                     .begin_tick = stamp.tick,
-                    .begin_s = replica.movement_time_s(),
+                    .begin_s = time_s,
                     .tick_s = tick_s,
                     .movement = movement,
                     .bytes = bytes});
   bytes_ += bytes;
   cursor = {.recording = number_,
-            .movement = replica.movement_number(),
+            .movement = movement->number,
             .standing = stamp.standing,
             .begin_tick = stamp.tick,
-            .begin_s = replica.movement_time_s()};
+            .begin_s = time_s};
 }
 
 std::size_t MovementRecording::Evaluate(std::uint64_t tick,

@@ -22,17 +22,22 @@ class MovementRecording {
   /// Identifies the last recorded movement of an avatar. The caller keeps one cursor per avatar.
   struct Cursor {
     std::uint64_t recording = 0;  ///< Number of the recording; 0: no movement is recorded.
-    std::uint32_t movement = 0;   ///< AvatarReplica::movement_number().
+    std::uint32_t movement = 0;   ///< PlayedMovement::number
     bool standing = false;
     std::uint64_t begin_tick = 0;
     double begin_s = 0.0;  ///< Time of the movement at `begin_tick`.
   };
 
-  /// Records the pose of an avatar that has a movement and no layers. `movement` is the movement of
-  /// `replica`. Stores it unless the pose continues the movement of `cursor`. `tick_s` is the
-  /// length of a tick. Ticks must not decrease, except for small differences between shards.
-  void Add(protocol::AvatarId avatar, const PoseStamp& stamp, const AvatarReplica& replica,
-           const std::shared_ptr<const PlayedMovement>& movement,
+  /// A movement is stored again after this many ticks, so that the oldest ones can be removed even
+  /// if an avatar continues the same movement for a long time.
+  static constexpr std::uint64_t kMaxTicks = 120;
+
+  /// Records the pose of an avatar that has a movement and no layers, at `time_s` in the movement.
+  /// Stores the movement unless the pose continues that of `cursor`. `tick_s` is the length of a
+  /// tick. Ticks must not decrease, except for small differences between shards. Ticks may be
+  /// omitted while a movement continues, but not kMaxTicks of them.
+  void Add(protocol::AvatarId avatar, const PoseStamp& stamp,
+           const std::shared_ptr<const PlayedMovement>& movement, double time_s,
            const std::shared_ptr<const MotionLibrary>& library, double tick_s, Cursor& cursor);
 
   /// Evaluates the poses of these avatars in a tick and writes them to `out` from index `at` on.
@@ -45,14 +50,12 @@ class MovementRecording {
   void DropBefore(std::uint64_t tick);
   void Clear();
 
+  /// Changes when the recorded movements are removed, which invalidates all cursors.
+  [[nodiscard]] std::uint64_t number() const { return number_; }
   /// Returns the memory of the recorded movements in bytes.
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
-  /// A movement is stored again after this many ticks, so that the oldest ones can be removed even
-  /// if an avatar continues the same movement for a long time.
-  static constexpr std::uint64_t kMaxTicks = 120;
-
   struct Span {
     protocol::AvatarId avatar = 0;
     std::uint8_t flags = 0;  ///< CrowdFlags of the pose at `begin_tick`.
@@ -67,7 +70,7 @@ class MovementRecording {
   std::optional<MovementEvaluator> evaluator_;  // Has a value after the first evaluation.
   // In ascending order of begin_tick, except for small differences between shards.
   std::deque<Span> spans_;
-  std::uint64_t number_ = 1;  // Clear increases it, which invalidates all cursors.
+  std::uint64_t number_ = 1;
   std::size_t bytes_ = 0;
   std::vector<const Span*> found_;  // Scratch memory of Evaluate.
 };

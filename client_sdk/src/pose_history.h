@@ -84,6 +84,14 @@ class PoseHistory {
     return correction_.state != Correction::State::kNone &&
            time_s - correction_.start_s < kCorrectionS;
   }
+  /// Returns true if the newest displayed pose is after the newest pose of the history.
+  [[nodiscard]] bool IsDisplayedAfterNewest() const {
+    return size_ > 0 && displayed_s_ > stamp(size_ - 1).time_s;
+  }
+  /// Returns true if Display evaluates a movement at a time between two poses.
+  [[nodiscard]] bool IsMovementAt(double time_s) const {
+    return FindCurve(time_s).kind == Curve::Kind::kMovement;
+  }
   /// Call it if the caller has computed and displayed the pose at `time_s` itself.
   void SetDisplayed(double time_s) { displayed_s_ = time_s; }
 

@@ -58,6 +58,7 @@ template <typename Predicate>
 void WorldView::EraseTracks(const Predicate& is_erased) {
   std::erase_if(tracks_, [&](const Track& track) {
     if (!is_erased(track)) return false;
+    if (track.continued.movement != nullptr) ended_.push_back(track.avatar);
     const std::size_t bytes = PoseHistory::Bytes(pose_history_, track.history.joint_count());
     STRIDEWIRE_CHECK(budget_.used_bytes >= bytes);
     budget_.used_bytes -= bytes;
@@ -182,7 +183,7 @@ WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
 template <typename PushPose>
 void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, Counts& counts,
                      const PushPose& push) {
-  Flush(track);
+  EndContinuing(track);
   stamp.discontinuity |= track.epoch != epoch_;
   if (stamp.discontinuity || track.history.IsInterrupted()) track.segment = ++last_segment_;
   stamp.segment = track.segment;
@@ -199,26 +200,41 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, Counts& co
   track.seen_tick = stamp.tick;
 }
 
-void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+bool WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                        const AvatarReplica& replica) {
-  if (!Wants(avatar)) return;
+  if (!Wants(avatar)) return false;
   Track* track = FindOrAddTrack(avatar);
   if (track == nullptr) {
     ++replica_counts_->refused;
-    return;
+    return false;
   }
-  if (Continue(*track, shard, stamp, replica)) {
+  if (EvaluatesMovements()) AddTick();
+  if (IsContinued(*track, stamp, replica)) {
     ++replica_counts_->poses;
   } else {
     PushEvaluated(*track, shard, stamp, replica);
+    if (EvaluatesMovements()) BeginContinuing(*track);
   }
   if (recording_.enabled()) Record(*track, stamp, replica);
+  return track->continued.movement != nullptr;
+}
+
+void WorldView::OnContinued(protocol::AvatarId avatar) {
+  AddTick();
+  ++replica_counts_->poses;
+  if (recording_.enabled()) moving_.push_back(avatar);
 }
 
 void WorldView::PushEvaluated(Track& track, std::uint16_t shard, const PoseStamp& stamp,
                               const AvatarReplica& replica) {
   const bool is_movement = HasMovementOnly(replica);
-  Flush(track);  // Needs the previous movement.
+  if (track.continued.movement != nullptr) {
+    // The movement has ended before this tick.
+    const ShardTicks& ticks = *track.continued.ticks;
+    const bool has_tick = &ticks == ticks_ && ticks.at(ticks.count - 1).tick == stamp.tick;
+    Flush(track, ticks.count - (has_tick ? 1 : 0));  // Needs the previous movement.
+    track.continued = {};
+  }
   if (stamp.discontinuity) track.movement = nullptr;
   if (is_movement && (recording_.enabled() || EvaluatesMovements())) KeepMovement(track, replica);
   Push(track, {shard, protocol::PoseMode::kMovement}, stamp, *replica_counts_,
@@ -235,8 +251,8 @@ void WorldView::PushEvaluated(Track& track, std::uint16_t shard, const PoseStamp
 void WorldView::Record(Track& track, const PoseStamp& stamp, const AvatarReplica& replica) {
   if (HasMovementOnly(replica)) {
     moving_.push_back(track.avatar);
-    recording_.movements().Add(track.avatar, stamp, replica, track.movement, replicas_->library(),
-                               replicas_->tick_s(), track.recorded);
+    recording_.movements().Add(track.avatar, stamp, track.movement, replica.movement_time_s(),
+                               replicas_->library(), tick_s_, track.recorded);
     return;
   }
   const ConstPoseSpan pose = replica.pose();
@@ -256,10 +272,9 @@ bool WorldView::HasMovementOnly(const AvatarReplica& replica) {
 }
 
 void WorldView::ShardTicks::FindSample(double time_s) {
-  const std::uint64_t oldest = count - std::min<std::uint64_t>(count, ring.size());
   sampled = count;
-  while (sampled > oldest && at(sampled - 1).time_s > time_s) --sampled;
-  is_sampled = sampled > oldest;
+  while (sampled > oldest() && at(sampled - 1).time_s > time_s) --sampled;
+  is_sampled = sampled > oldest();
   if (!is_sampled) return;
   const Tick& start = at(--sampled);
   share = 0.0;
@@ -268,76 +283,139 @@ void WorldView::ShardTicks::FindSample(double time_s) {
   if (is_sampled) share = (time_s - start.time_s) / (at(sampled + 1).time_s - start.time_s);
 }
 
-bool WorldView::Continue(Track& track, std::uint16_t shard, const PoseStamp& stamp,
-                         const AvatarReplica& replica) {
-  if (!EvaluatesMovements()) return false;
-  if (ticks_ == nullptr) ticks_ = &shard_ticks_[shard];
-  if (ticks_->count == 0 || stamp.tick > ticks_->at(ticks_->count - 1).tick) {
-    ticks_->ring[ticks_->count++ % ticks_->ring.size()] = {stamp.tick, stamp.time_s, step_};
-  }
-  Continued& continued = track.continued;
-  if (continued.movement == nullptr) return false;
-  const std::uint64_t last = ticks_->count - 1;
-  if (continued.ticks != ticks_ || continued.last + 1 != last ||
-      ticks_->at(last).tick != stamp.tick ||
-      ticks_->count - continued.first >= ticks_->ring.size() ||
-      continued.number != replica.movement_number() || !HasMovementOnly(replica) ||
-      continued.standing != stamp.standing || stamp.discontinuity || track.epoch != epoch_) {
-    return false;
-  }
-  continued.last = last;
-  track.seen_tick = stamp.tick;
-  return true;
+void WorldView::AddTick() {
+  if (ticks_ == nullptr) ticks_ = &shard_ticks_[message_->shard];
+  if (ticks_->count > 0 && message_->tick <= ticks_->at(ticks_->count - 1).tick) return;
+  ticks_->ring[ticks_->count++ % ticks_->ring.size()] = {message_->tick, message_->server_time_s,
+                                                         message_->step};
 }
 
-void WorldView::BeginContinuing(Track& track, double time_s) {
+bool WorldView::IsContinued(const Track& track, const PoseStamp& stamp,
+                            const AvatarReplica& replica) const {
+  const Continued& continued = track.continued;
+  return continued.movement != nullptr && continued.ticks == ticks_ &&
+         ticks_->at(ticks_->count - 1).tick == stamp.tick &&
+         continued.number == replica.movement_number() && HasMovementOnly(replica) &&
+         continued.standing == stamp.standing && !stamp.discontinuity && track.epoch == epoch_;
+}
+
+void WorldView::BeginContinuing(Track& track) {
   const PoseHistory& history = track.history;
   const auto [movement, movement_s] = history.NewestMovement();
   const PoseStamp& stamp = history.stamp(history.size() - 1);
+  const MovementPoint newest = {ticks_->count - 1, message_->step, movement_s};
   if (movement == nullptr || movement != track.movement.get() || track.gone ||
-      stamp.discontinuity || time_s > stamp.time_s || history.IsCorrected(time_s)) {
+      stamp.discontinuity || ticks_->at(newest.tick).tick != stamp.tick ||
+      history.IsDisplayedAfterNewest() || history.IsCorrected(sampled_s_)) {
     return;
   }
-  const ShardTicks& ticks = shard_ticks_[track.shard];
-  if (ticks.count == 0 || ticks.at(ticks.count - 1).tick != stamp.tick) return;
   track.continued = {.movement = movement,
-                     .first_s = movement_s,
-                     .ticks = &ticks,
-                     .first = ticks.count - 1,
-                     .last = ticks.count - 1,
+                     .ticks = ticks_,
+                     .sampled = newest,
+                     .stored = newest,
                      .number = movement->number,
                      .standing = stamp.standing};
 }
 
-double WorldView::MovementTimeAt(const Continued& continued, std::uint64_t i) const {
-  const ShardTicks& ticks = *continued.ticks;
-  double time_s = continued.first_s;
-  const std::uint64_t steps = ticks.at(i).step - ticks.at(continued.first).step;
-  for (std::uint64_t step = 0; step < steps; ++step) time_s += tick_s_;
-  return time_s;
+void WorldView::MoveTo(std::uint64_t tick, const ShardTicks& ticks, MovementPoint& point) const {
+  point.tick = tick;
+  for (; point.step < ticks.at(tick).step; ++point.step) point.time_s += tick_s_;
 }
 
-void WorldView::Flush(Track& track) {
-  if (track.continued.movement == nullptr) return;
-  const Continued continued = std::exchange(track.continued, {});
+std::optional<double> WorldView::SampledTime(Continued& continued) const {
+  if (continued.movement == nullptr) return std::nullopt;
   const ShardTicks& ticks = *continued.ticks;
-  if (!ticks.Has(continued.first)) return;
-  double movement_s = continued.first_s;
-  std::uint64_t step = ticks.at(continued.first).step;
-  for (std::uint64_t i = continued.first + 1; i <= continued.last; ++i) {
+  if (!ticks.is_sampled || ticks.sampled < continued.sampled.tick) return std::nullopt;
+  MoveTo(ticks.sampled, ticks, continued.sampled);
+  const double time_s = continued.sampled.time_s;
+  if (ticks.share == 0.0) return time_s;
+  MovementPoint next = continued.sampled;
+  MoveTo(ticks.sampled + 1, ticks, next);
+  return time_s + ticks.share * (next.time_s - time_s);
+}
+
+void WorldView::PrepareHistory(Track& track, double time_s) {
+  const Continued& continued = track.continued;
+  if (continued.movement == nullptr) return;
+  // After the newest tick, the motion is extrapolated until the next pose, which may be late.
+  if (!continued.ticks->is_sampled) return EndContinuing(track);
+  if (continued.ticks->sampled < continued.stored.tick && track.history.IsMovementAt(time_s))
+    return;
+  Flush(track);
+}
+
+void WorldView::Flush(Track& track, std::uint64_t end) {
+  Continued& continued = track.continued;
+  const ShardTicks& ticks = *continued.ticks;
+  const std::uint64_t begin = std::max(continued.stored.tick + 1, ticks.oldest());
+  for (std::uint64_t i = begin; i < end; ++i) {
+    MoveTo(i, ticks, continued.stored);
     const ShardTicks::Tick& tick = ticks.at(i);
-    for (; step < tick.step; ++step) movement_s += tick_s_;
     track.history.Push({.tick = tick.tick,
                         .time_s = tick.time_s,
                         .segment = track.segment,
                         .standing = continued.standing},
-                       track.movement, movement_s, *evaluator_);
+                       track.movement, continued.stored.time_s, *evaluator_);
+    track.seen_tick = tick.tick;
   }
-  track.history.SetDisplayed(sampled_s_);
+  if (continued.is_displayed) track.history.SetDisplayed(sampled_s_);
 }
 
-void WorldView::FlushAll() {
-  for (Track& track : tracks_) Flush(track);
+void WorldView::EndContinuing(Track& track) {
+  if (track.continued.movement == nullptr) return;
+  Flush(track);
+  track.continued = {};
+  ended_.push_back(track.avatar);
+}
+
+void WorldView::EndContinuingAll() {
+  for (Track& track : tracks_) EndContinuing(track);
+}
+
+void WorldView::UpdateContinued(const protocol::Movements& movements) {
+  // If the recording was cleared or the server has skipped ticks, the recording needs all movements
+  // again.
+  const auto shard = shard_ticks_.find(movements.shard);
+  if (shard != shard_ticks_.end() && !movements.states && movements.more_steps == 0) {
+    const ShardTicks::Tick& newest = shard->second.at(shard->second.count - 1);
+    if (movements.tick - newest.tick != movements.step - newest.step) EndContinuingAll();
+  }
+  const std::uint64_t number = recording_.movements().number();
+  if (std::exchange(recording_number_, number) != number) EndContinuingAll();
+
+  // Tracks are visited at this interval in ticks.
+  constexpr std::uint64_t kTicks = 16;
+  constexpr std::uint64_t kMaxAge = 64;
+  static_assert(kMaxAge + kTicks < std::tuple_size_v<decltype(ShardTicks::ring)>);
+  static_assert(2 * kTicks < MovementRecording::kMaxTicks);
+  const std::uint64_t passed = movements.tick - std::min(updated_tick_, movements.tick);
+  if (passed == 0) return;
+  updated_tick_ = movements.tick;
+  const auto share = static_cast<std::size_t>(std::min(passed, kTicks));
+  const std::size_t count =
+      std::min(tracks_.size(), tracks_.size() * share / std::size_t{kTicks} + 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (updated_track_ >= tracks_.size()) updated_track_ = 0;
+    Track& track = tracks_[updated_track_++];
+    Continued& continued = track.continued;
+    if (continued.movement == nullptr) continue;
+    const ShardTicks& ticks = *continued.ticks;
+    const bool is_recorded =
+        !recording_.enabled() ||
+        ticks.at(ticks.count - 1).tick - track.recorded.begin_tick + 2 * kTicks <
+            MovementRecording::kMaxTicks;
+    if (is_recorded && ticks.count - continued.stored.tick <= kMaxAge &&
+        ticks.count - continued.sampled.tick <= kMaxAge) {
+      continue;
+    }
+    Flush(track);
+    if (ticks.count - continued.sampled.tick > kMaxAge) continued.sampled = continued.stored;
+    if (is_recorded) continue;
+    track.recorded = {};  // Stores the movement again.
+    const PoseStamp& newest = track.history.stamp(track.history.size() - 1);
+    recording_.movements().Add(track.avatar, newest, track.movement, continued.stored.time_s,
+                               evaluator_->library(), tick_s_, track.recorded);
+  }
 }
 
 void WorldView::KeepMovement(Track& track, const AvatarReplica& replica) {
@@ -401,7 +479,7 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
   }
   if (evaluator_ == nullptr || evaluator_->library() != replicas.library() ||
       tick_s_ != replicas.tick_s()) {
-    FlushAll();
+    EndContinuingAll();
     for (Track& track : tracks_) track.history.EvaluateAll();
     tick_s_ = replicas.tick_s();
     evaluator_ = std::make_unique<MovementEvaluator>(replicas.library());
@@ -411,8 +489,9 @@ Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replic
   replica_every_n_ticks_ = std::max<std::uint64_t>(every_n_ticks, 1);
   replica_counts_ = &counts;
   replicas_ = &replicas;
+  message_ = &movements;
   ticks_ = nullptr;
-  step_ = movements.step;
+  if (EvaluatesMovements()) UpdateContinued(movements);
   moving_.clear();
   evaluated_.clear();
   evaluated_flags_.clear();
@@ -457,7 +536,7 @@ void WorldView::Remove(protocol::AvatarId avatar) {
 
 void WorldView::SetGone(Track& track, bool gone) {
   if (track.gone == gone) return;
-  Flush(track);
+  EndContinuing(track);
   track.gone = gone;
   if (gone) {
     ++gone_count_;
@@ -485,38 +564,34 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
       if (later != nullptr) SoaPoseEvaluator::PrefetchTimes(later->movement);
     }
     const std::size_t pose = sampled_tracks_.size();
-    if (const Continued& continued = tracks_[i].continued; IsSampled(continued)) {
-      const ShardTicks& ticks = *continued.ticks;
-      double movement_s = MovementTimeAt(continued, ticks.sampled);
-      if (ticks.share > 0.0) {
-        movement_s += ticks.share * (MovementTimeAt(continued, ticks.sampled + 1) - movement_s);
-      }
-      evaluator_->Add(continued.movement->movement, movement_s, out.roots_m[pose],
+    Track& track = tracks_[i];
+    if (const auto movement_s = SampledTime(track.continued)) {
+      track.continued.is_displayed = true;
+      evaluator_->Add(track.continued.movement->movement, *movement_s, out.roots_m[pose],
                       rotations_of(pose));
-      sampled_tracks_.push_back(i);
+      sampled_tracks_.push_back({i, true});
       continue;
     }
-    Flush(tracks_[i]);
-    if (i + 1 < tracks_.size()) tracks_[i + 1].history.Prefetch(time_s, false);
-    PoseHistory& history = tracks_[i].history;
-    if (history.size() == 0 || (tracks_[i].gone && is_after_newest(history))) continue;
+    PrepareHistory(track, time_s);
+    PoseHistory& history = track.history;
+    if (history.size() == 0 || (track.gone && is_after_newest(history))) continue;
     if (history.Prepare(time_s, out.roots_m[pose], rotations_of(pose))) {
-      sampled_tracks_.push_back(i);
+      sampled_tracks_.push_back({i, false});
     }
   }
   if (evaluator_ != nullptr) evaluator_->Evaluate();
   std::size_t count = 0;
-  for (const std::size_t i : sampled_tracks_) {
+  for (const auto& [i, is_continued] : sampled_tracks_) {
     Track& track = tracks_[i];
     out.avatars[count] = track.avatar;
-    if (track.continued.movement != nullptr) {
+    if (is_continued) {
       displayed.Add({.interpolated = true}, false);
       out.flags[count++] = track.continued.standing ? kCrowdStanding : 0;
       continue;
     }
     if (count + 1 < sampled_tracks_.size()) {
-      const Track& next = tracks_[sampled_tracks_[count + 1]];
-      if (next.continued.movement == nullptr) next.history.Prefetch(time_s, true);
+      const auto& [next, is_next_continued] = sampled_tracks_[count + 1];
+      if (!is_next_continued) tracks_[next].history.Prefetch(time_s, true);
     }
     PoseHistory& history = track.history;
     const auto sampled = history.Display(time_s, out.roots_m[count], rotations_of(count));
@@ -530,15 +605,14 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
       flags |= kCrowdHeld;
     }
     out.flags[count++] = static_cast<std::uint8_t>(flags);
-    if (EvaluatesMovements()) BeginContinuing(track, time_s);
   }
   sampled_s_ = time_s;
   out.Resize(count, joints);
 }
 
 void WorldView::RenumberSegments() {
-  FlushAll();
   for (Track& track : tracks_) {
+    Flush(track);
     PoseHistory& history = track.history;
     std::optional<std::uint32_t> old;
     for (std::size_t i = 0; i < history.size(); ++i) {

@@ -95,7 +95,10 @@ class WorldView : public PoseSink {
 
   /// Marks the next pose of every avatar as a discontinuity. Call it after a resume and after a new
   /// subscription. The server cannot flag these discontinuities, because clients share batches.
-  void Break() { ++epoch_; }
+  void Break() {
+    ++epoch_;
+    EndContinuingAll();
+  }
 
   /// Stores only poses of these avatars. nullopt: of all avatars.
   void SetFilter(std::optional<std::set<protocol::AvatarId>> filter);
@@ -153,10 +156,13 @@ class WorldView : public PoseSink {
       double time_s = 0.0;
       std::uint64_t step = 0;  ///< Movements::step
     };
-    std::array<Tick, 64> ring;
+    std::array<Tick, 128> ring;
     std::uint64_t count = 0;
     [[nodiscard]] const Tick& at(std::uint64_t i) const { return ring[i % ring.size()]; }
-    [[nodiscard]] bool Has(std::uint64_t i) const { return count - i <= ring.size(); }
+    /// Returns the number of the oldest tick.
+    [[nodiscard]] std::uint64_t oldest() const {
+      return count - std::min<std::uint64_t>(count, ring.size());
+    }
 
     // Scratch memory of SampleAll: the sampled time is `share` of the way from `sampled` to the
     // next tick. If there is no such tick, `is_sampled` is false.
@@ -165,17 +171,23 @@ class WorldView : public PoseSink {
     bool is_sampled = false;
     void FindSample(double time_s);
   };
-  /// A movement that continues without any change. The poses of its ticks after `first` are not in
-  /// the history yet. SampleAll evaluates the movement without reading the history, and ticks do
-  /// not write to it. This saves most cache misses.
+  /// A point of a movement.
+  struct MovementPoint {
+    std::uint64_t tick = 0;  ///< Number of the tick in the ring of its shard.
+    std::uint64_t step = 0;  ///< Movements::step of the tick.
+    double time_s = 0.0;     ///< Time of the movement at the tick.
+  };
+  /// A movement that continues in all ticks of its shard until the next record of the avatar. The
+  /// poses of its ticks after `stored` are not in the history yet. SampleAll evaluates the movement
+  /// without reading the history, and ticks do not access the track. This saves most cache misses.
   struct Continued {
     const PlayedMovement* movement = nullptr;  ///< Null: the history contains all poses.
-    double first_s = 0.0;                      ///< Time of the movement at `first`.
     const ShardTicks* ticks = nullptr;
-    std::uint64_t first = 0;   ///< Number of the newest tick in the history.
-    std::uint64_t last = 0;    ///< Number of the newest tick.
+    MovementPoint sampled;     ///< Tick from which SampleAll computes the time of the movement.
+    MovementPoint stored;      ///< Newest tick in the history.
     std::uint32_t number = 0;  ///< PlayedMovement::number, which is not in the cache.
     bool standing = false;
+    bool is_displayed = false;  ///< SampleAll has evaluated the movement.
   };
   struct Track {
     // The members that are read in every tick come first.
@@ -199,8 +211,12 @@ class WorldView : public PoseSink {
   };
   using Lane = std::pair<std::uint16_t, protocol::PoseMode>;  // shard, mode
 
-  void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+  bool OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
               const AvatarReplica& replica) override;
+  void OnContinued(protocol::AvatarId avatar) override;
+  [[nodiscard]] std::vector<protocol::AvatarId> TakeEnded() override {
+    return std::exchange(ended_, {});
+  }
   void Prefetch(protocol::AvatarId avatar) override;
   void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return Admits(avatar); }
@@ -225,24 +241,31 @@ class WorldView : public PoseSink {
   void PushEvaluated(Track& track, std::uint16_t shard, const PoseStamp& stamp,
                      const AvatarReplica& replica);
   void Record(Track& track, const PoseStamp& stamp, const AvatarReplica& replica);
-  /// Adds the last tick of the avatar to the movement that continues. Returns false if it does not
-  /// continue or if the history must be updated.
-  bool Continue(Track& track, std::uint16_t shard, const PoseStamp& stamp,
-                const AvatarReplica& replica);
+  /// Adds the tick of the current message to those of its shard.
+  void AddTick();
+  /// Returns true if the movement that continues includes a pose.
+  [[nodiscard]] bool IsContinued(const Track& track, const PoseStamp& stamp,
+                                 const AvatarReplica& replica) const;
   /// Begins to continue the newest movement, if nothing but the history determines the motion.
-  void BeginContinuing(Track& track, double time_s);
-  /// Returns the time in the movement at a tick, summed tick by tick as replicas do.
-  [[nodiscard]] double MovementTimeAt(const Continued& continued, std::uint64_t i) const;
-  /// Returns true if SampleAll can evaluate the movement at its time.
-  [[nodiscard]] static bool IsSampled(const Continued& continued) {
-    if (continued.movement == nullptr || !continued.ticks->is_sampled) return false;
-    const ShardTicks& ticks = *continued.ticks;
-    return ticks.Has(continued.first) && ticks.sampled >= continued.first &&
-           ticks.sampled + (ticks.share > 0.0 ? 1 : 0) <= continued.last;
+  void BeginContinuing(Track& track);
+  /// Moves a point of a movement to a later tick. Sums the time tick by tick, as replicas do.
+  void MoveTo(std::uint64_t tick, const ShardTicks& ticks, MovementPoint& point) const;
+  /// Returns the time of the movement that SampleAll evaluates for a track, if any.
+  [[nodiscard]] std::optional<double> SampledTime(Continued& continued) const;
+  /// Prepares the history of a track for a time at which SampleAll does not evaluate the movement
+  /// that continues.
+  void PrepareHistory(Track& track, double time_s);
+  /// Adds the poses of the movement that continues to the history, up to the tick before `end`.
+  void Flush(Track& track, std::uint64_t end);
+  void Flush(Track& track) {
+    if (track.continued.movement != nullptr) Flush(track, track.continued.ticks->count);
   }
-  /// Adds the poses of the movement that continues to the history.
-  void Flush(Track& track);
-  void FlushAll();
+  /// Adds all poses to the history, which then determines the motion. The next tick calls OnPose.
+  void EndContinuing(Track& track);
+  void EndContinuingAll();
+  /// Visits a part of the tracks per tick, so that the ticks of continued movements are added to
+  /// histories and recordings while they are known.
+  void UpdateContinued(const protocol::Movements& movements);
   /// Copies the movement of an avatar unless the track has it already.
   static void KeepMovement(Track& track, const AvatarReplica& replica);
 
@@ -285,11 +308,20 @@ class WorldView : public PoseSink {
   double newest_time_s_ = -std::numeric_limits<double>::infinity();
   std::vector<Quat> scratch_;
   std::map<std::uint16_t, ShardTicks> shard_ticks_;
-  ShardTicks* ticks_ = nullptr;  // Ticks of the shard of the current message; null: not known yet.
-  std::uint64_t step_ = 0;       // Step of the current message.
-  double tick_s_ = 0.0;          // Length of a tick of the last replicas.
-  double sampled_s_ = 0.0;       // Time of the last SampleAll.
-  std::vector<std::size_t> sampled_tracks_;  // Scratch memory of SampleAll.
+  // Message to apply, and the ticks of its shard. Set while Apply(Movements) runs.
+  const protocol::Movements* message_ = nullptr;
+  ShardTicks* ticks_ = nullptr;
+  std::vector<protocol::AvatarId> ended_;  // See TakeEnded.
+  std::uint64_t recording_number_ = 0;     // MovementRecording::number() at the last message.
+  std::uint64_t updated_tick_ = 0;         // Tick of the last UpdateContinued,
+  std::size_t updated_track_ = 0;          // and the track where the next one starts.
+  double tick_s_ = 0.0;                    // Length of a tick of the last replicas.
+  double sampled_s_ = 0.0;                 // Time of the last SampleAll.
+  struct SampledTrack {
+    std::size_t track;
+    bool is_continued;  // The pose is that of Track::continued.
+  };
+  std::vector<SampledTrack> sampled_tracks_;  // Scratch memory of SampleAll.
   // Interval of poses in ticks, as requested. Set while Apply(Movements) runs.
   std::uint64_t replica_every_n_ticks_ = 1;
   const ReplicaSet* replicas_ = nullptr;  // Set while Apply(Movements) runs.

@@ -17,6 +17,15 @@ ReplicaSet::ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick
   STRIDEWIRE_CHECK(tick_s > 0.0);
 }
 
+void ReplicaSet::EndContinued(PoseSink& sink) {
+  for (const protocol::AvatarId id : sink.TakeEnded()) {
+    for (auto& [number, shard] : shards_) {
+      const auto found = std::ranges::lower_bound(shard.avatars, id, {}, &Avatar::id);
+      if (found != shard.avatars.end() && found->id == id) found->is_ended = true;
+    }
+  }
+}
+
 // Discards the shard's avatars if `message` does not follow the last message that was applied.
 void ReplicaSet::Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink) {
   const std::uint64_t previous_step = message.states ? message.step : message.step - 1;
@@ -33,6 +42,7 @@ Status ReplicaSet::ApplyRecord(const protocol::Movements& message, std::size_t i
   const protocol::AvatarId id = message.avatars[i];
   auto found = std::ranges::lower_bound(shard.avatars, id, {}, &Avatar::id);
   const bool is_known = found != shard.avatars.end() && found->id == id;
+  if (is_known) CatchUp(*found, message.states ? message.step : message.step - 1);
   if ((message.flags[i] & protocol::kMovementGone) != 0) {
     if (is_known && found->replica != nullptr) {
       found->replica = nullptr;
@@ -54,17 +64,27 @@ Status ReplicaSet::ApplyRecord(const protocol::Movements& message, std::size_t i
   return found->replica->Apply(RecordOf(message, i), plan_scratch_);
 }
 
+void ReplicaSet::CatchUp(Avatar& avatar, std::uint64_t step) const {
+  if (!std::exchange(avatar.is_continued, false)) return;
+  STRIDEWIRE_CHECK(step >= avatar.step);
+  avatar.replica->SkipTicks(step - avatar.step, tick_s_);
+}
+
 void ReplicaSet::EmitPose(const protocol::Movements& message, Avatar& avatar, PoseSink& sink) {
   const PoseStamp stamp{.tick = message.tick,
                         .time_s = message.server_time_s,
                         .discontinuity = std::exchange(avatar.discontinuity, false),
                         .standing = avatar.replica->idle()};
-  sink.OnPose(avatar.id, message.shard, stamp, *avatar.replica);
+  avatar.is_continued = sink.OnPose(avatar.id, message.shard, stamp, *avatar.replica);
+  avatar.is_ended = false;
+  avatar.step = message.step;
 }
 
 // Advances the avatars in `due_` by one tick. Passes their poses to the sink if `emits` is true and
-// the sink needs the tick.
-void ReplicaSet::AdvanceDue(const protocol::Movements& message, bool emits, PoseSink& sink) {
+// the sink needs the tick. If the message contains no states, all other avatars of the shard are
+// continued by the sink.
+void ReplicaSet::AdvanceDue(const protocol::Movements& message, Shard& shard, bool emits,
+                            PoseSink& sink) {
   const std::uint64_t every_n_ticks = sink.EveryNTicks();
   const bool has_poses = emits && message.tick % every_n_ticks == 0;
   replicas_.clear();
@@ -80,12 +100,24 @@ void ReplicaSet::AdvanceDue(const protocol::Movements& message, bool emits, Pose
   // The poses and the memory of the sink are usually in no processor cache. They are prefetched
   // this many avatars ahead.
   constexpr std::size_t kPrefetched = 2;
-  for (std::size_t i = 0; i < due_.size() + kPrefetched; ++i) {
-    if (i < due_.size()) {
-      if (!sink.EvaluatesMovements()) due_[i]->replica->PrefetchPose();
-      sink.Prefetch(due_[i]->id);
+  const auto prefetch = [&](std::size_t i) {
+    if (i >= due_.size()) return;
+    if (!sink.EvaluatesMovements()) due_[i]->replica->PrefetchPose();
+    sink.Prefetch(due_[i]->id);
+  };
+  for (std::size_t i = 0; i < kPrefetched; ++i) prefetch(i);
+  const Avatar* continued = shard.avatars.data();
+  const Avatar* const last = continued + shard.avatars.size();
+  for (std::size_t i = 0; i <= due_.size(); ++i) {
+    // Avatars are passed to the sink in ascending order of their ids.
+    if (!message.states) {
+      const Avatar* const end = i < due_.size() ? due_[i] : last;
+      for (; continued != end; ++continued) sink.OnContinued(continued->id);
     }
-    if (i >= kPrefetched) EmitPose(message, *due_[i - kPrefetched], sink);
+    if (i == due_.size()) break;
+    prefetch(i + kPrefetched);
+    EmitPose(message, *due_[i], sink);
+    if (!message.states) ++continued;
   }
 }
 
@@ -100,6 +132,7 @@ Status ReplicaSet::Apply(const protocol::Movements& message, PoseSink& sink) {
     return Fail(ErrorCode::kLimitExceeded, "movements come from too many shards", message.shard);
   }
   Shard& shard = shards_[message.shard];
+  EndContinued(sink);
   Synchronize(message, shard, sink);
   Status status;
   for (std::size_t i = 0; i < message.avatars.size() && status; ++i) {
@@ -116,14 +149,18 @@ Status ReplicaSet::Apply(const protocol::Movements& message, PoseSink& sink) {
     }
     std::ranges::sort(due_);
     due_.erase(std::ranges::unique(due_).begin(), due_.end());
-    AdvanceDue(message, true, sink);
+    AdvanceDue(message, shard, true, sink);
     return {};
   }
   if (++shard.parts_applied < message.parts) return {};
   shard.parts_applied = 0;
   shard.step = message.step;
-  for (Avatar& avatar : shard.avatars) due_.push_back(&avatar);
-  AdvanceDue(message, message.more_steps == 0, sink);
+  for (Avatar& avatar : shard.avatars) {
+    if (avatar.is_continued && !avatar.is_ended) continue;
+    CatchUp(avatar, message.step - 1);
+    due_.push_back(&avatar);
+  }
+  AdvanceDue(message, shard, message.more_steps == 0, sink);
   return {};
 }
 

@@ -18,9 +18,19 @@ class PoseSink {
   virtual ~PoseSink() = default;
 
   /// Called when an avatar has a new pose, replica.pose(). `replica` is valid until the call
-  /// returns.
-  virtual void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+  /// returns. If the function returns true, the sink itself continues the movement, and the set
+  /// does not advance the replica until its next record. The avatar must have a movement and no
+  /// layers.
+  virtual bool OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                       const AvatarReplica& replica) = 0;
+
+  /// Called instead of OnPose if the sink continues the movement. This avoids reading the memory of
+  /// avatars of which nothing has changed.
+  virtual void OnContinued(protocol::AvatarId) {}
+
+  /// Returns the avatars whose movements the sink no longer continues, and forgets them. The set
+  /// calls OnPose for them in their next ticks. Called before a message is applied.
+  [[nodiscard]] virtual std::vector<protocol::AvatarId> TakeEnded() { return {}; }
 
   /// Called before OnPose for the same avatars in the same order, so that the sink can prefetch
   /// what OnPose reads.
@@ -76,6 +86,10 @@ class ReplicaSet {
     std::unique_ptr<AvatarReplica> replica;  // Null if the avatar is gone.
     // True if the next pose must not be interpolated from the previous one.
     bool discontinuity = true;
+    // True if the sink continues the movement. The replica is then at `step`.
+    bool is_continued = false;
+    bool is_ended = false;  // True if the sink no longer continues it.
+    std::uint64_t step = 0;
   };
   struct Shard {
     bool is_synchronized = false;
@@ -84,10 +98,13 @@ class ReplicaSet {
     std::vector<Avatar> avatars;      // In ascending order of the ids.
   };
 
+  void EndContinued(PoseSink& sink);
   void Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink);
   [[nodiscard]] Status ApplyRecord(const protocol::Movements& message, std::size_t i, Shard& shard,
                                    PoseSink& sink);
-  void AdvanceDue(const protocol::Movements& message, bool emits, PoseSink& sink);
+  // Advances a replica to a step if the sink has continued its movement.
+  void CatchUp(Avatar& avatar, std::uint64_t step) const;
+  void AdvanceDue(const protocol::Movements& message, Shard& shard, bool emits, PoseSink& sink);
   static void EmitPose(const protocol::Movements& message, Avatar& avatar, PoseSink& sink);
   void CheckAvatarCount() const;
 

@@ -179,7 +179,7 @@ class BatchSink final : public client::PoseSink {
       : bytes_(protocol::PoseBytes(protocol::PoseMode::kFull, joint_count)),
         wants_(std::move(wants)) {}
 
-  void OnPose(protocol::AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
+  bool OnPose(protocol::AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
               const AvatarReplica& replica) override {
     const ConstPoseSpan pose = replica.pose();
     const std::size_t begin = poses.size();
@@ -192,6 +192,7 @@ class BatchSink final : public client::PoseSink {
     flags.push_back(
         static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
                                   (stamp.standing ? protocol::kPoseStanding : 0)));
+    return false;
   }
   void OnGone(protocol::AvatarId) override {}
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return wants_(avatar); }

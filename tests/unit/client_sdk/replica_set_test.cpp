@@ -23,7 +23,7 @@ using protocol::Movements;
 constexpr double kTickS = 1.0 / 60.0;
 
 struct CollectingSink : PoseSink {
-  void OnPose(AvatarId avatar, std::uint16_t, const PoseStamp& stamp,
+  bool OnPose(AvatarId avatar, std::uint16_t, const PoseStamp& stamp,
               const AvatarReplica& replica) override {
     const ConstPoseSpan pose = replica.pose();
     Pose& kept = poses[avatar];
@@ -31,7 +31,10 @@ struct CollectingSink : PoseSink {
     kept.rotations.assign(pose.rotations.begin(), pose.rotations.end());
     stamps[avatar] = stamp;
     gone.erase(avatar);
+    return continues && replica.movement() != nullptr;
   }
+  void OnContinued(AvatarId avatar) override { ++continued[avatar]; }
+  [[nodiscard]] std::vector<AvatarId> TakeEnded() override { return std::exchange(ended, {}); }
   void OnGone(AvatarId avatar) override { gone.insert(avatar); }
   [[nodiscard]] bool Wants(AvatarId avatar) const override { return avatar != unwanted; }
   [[nodiscard]] std::uint64_t EveryNTicks() const override { return every_n_ticks; }
@@ -41,6 +44,9 @@ struct CollectingSink : PoseSink {
   std::set<AvatarId> gone;
   AvatarId unwanted = 0;
   std::uint64_t every_n_ticks = 1;
+  bool continues = false;
+  std::map<AvatarId, int> continued;
+  std::vector<AvatarId> ended;
 };
 
 // Simulates a shard of walking avatars and produces its messages.
@@ -148,6 +154,28 @@ TEST(ReplicaSet, EvaluatesOnlyTicksThatTheSinkNeeds) {
     if (!has_poses) continue;
     EXPECT_EQ(sink.stamps[1].discontinuity, std::exchange(is_first, false)) << "step " << i;
   }
+}
+
+TEST(ReplicaSet, AdvancesAvatarsThatTheSinkHasContinued) {
+  Server server(5);
+  CollectingSink sink;
+  sink.continues = true;
+  ReplicaSet replicas(server.library(), kTickS, 100);
+  int continued = 0;
+  for (int i = 0; i < 300; ++i) {
+    if (i % 7 == 0) sink.ended = {2, 4};
+    sink.continued.clear();
+    const Movements message = server.Step(i % 10 == 9 ? 1 : 0);
+    ASSERT_TRUE(replicas.Apply(message, sink));
+    if (message.more_steps > 0) continue;
+    continued += static_cast<int>(sink.continued.size());
+    ASSERT_EQ(server.CountEqualPoses(sink), 5 - static_cast<int>(sink.continued.size()));
+    for (const AvatarId avatar : message.avatars) EXPECT_FALSE(sink.continued.contains(avatar));
+    if (i % 7 != 0) continue;
+    EXPECT_FALSE(sink.continued.contains(2));
+    EXPECT_FALSE(sink.continued.contains(4));
+  }
+  EXPECT_GT(continued, 1000);
 }
 
 TEST(ReplicaSet, EmitsPosesAfterTheLastStepAndPart) {

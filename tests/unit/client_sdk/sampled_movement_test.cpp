@@ -115,6 +115,19 @@ class SampledMovementTest : public testing::Test {
       }
     }
   }
+  /// Compares the recorded poses of a time before now. The recordings contain the last 5 s.
+  void ExpectSameRecordings(double ago_s) {
+    const auto all = [](protocol::AvatarId) { return true; };
+    CrowdPose expected;
+    CrowdPose actual;
+    every_tick_.view.recording().SampleAll(now_s() - ago_s, all, expected);
+    when_sampled_.view.recording().SampleAll(now_s() - ago_s, all, actual);
+    ASSERT_EQ(actual.avatars, expected.avatars) << tick_;
+    EXPECT_EQ(actual.flags, expected.flags) << tick_;
+    double distance_m = 0.0;
+    EXPECT_LT(LargestTurn(actual, expected, distance_m), 3e-3) << tick_;
+    EXPECT_LT(distance_m, 1e-5) << tick_;
+  }
   static ConstPoseSpan PoseOf(const CrowdPose& crowd, std::size_t i) {
     return {crowd.roots_m[i],
             std::span(crowd.rotations).subspan(i * crowd.joint_count, crowd.joint_count)};
@@ -134,6 +147,9 @@ class SampledMovementTest : public testing::Test {
     return turn_rad;
   }
   [[nodiscard]] double now_s() const { return kIntervalS * static_cast<double>(tick_); }
+  [[nodiscard]] protocol::Movements Empty() const {
+    return {.world = 1, .tick = tick_, .server_time_s = now_s()};
+  }
 
   std::shared_ptr<const MotionLibrary> library_ = OpenLibrary("builtin").value();
   std::uint64_t tick_ = 0;
@@ -142,9 +158,6 @@ class SampledMovementTest : public testing::Test {
   Viewer when_sampled_{library_, WorldView::Evaluation::kWhenSampled};
 
  private:
-  protocol::Movements Empty() const {
-    return {.world = 1, .tick = tick_, .server_time_s = now_s()};
-  }
   static void Add(protocol::Movements& message, protocol::AvatarId id, std::uint8_t flags) {
     message.avatars.push_back(id);
     message.flags.push_back(flags);
@@ -235,6 +248,29 @@ TEST_F(SampledMovementTest, DisplaysTheSameMotionIfMessagesAreLate) {
   EXPECT_LT(turn_rad, 0.06);
   EXPECT_LT(distance_m, 0.002);
   ASSERT_NO_FATAL_FAILURE(ExpectSameHistories());
+}
+
+TEST_F(SampledMovementTest, RecordsTheSamePoses) {
+  for (int i = 0; i < 900; ++i) {
+    Advance();
+    when_sampled_.Sample(now_s() - 1.4 * kIntervalS);
+    if (i % 10 != 0) continue;
+    if (i == 300) {
+      for (Viewer* viewer : {&every_tick_, &when_sampled_}) viewer->view.recording().Clear();
+      Advance();
+    }
+    ASSERT_NO_FATAL_FAILURE(ExpectSameRecordings(0.01 * (i % 300)));
+  }
+  // Movements that last longer than the recordings.
+  for (int i = 0; i < 600; ++i) {
+    ++tick_;
+    protocol::Movements message = Empty();
+    message.step = tick_;
+    every_tick_.Receive(message, 1);
+    when_sampled_.Receive(message, 1);
+    if (i % 10 != 0) continue;
+    ASSERT_NO_FATAL_FAILURE(ExpectSameRecordings(0.02 * (i % 200)));
+  }
 }
 
 TEST_F(SampledMovementTest, KeepsPosesIfTheLibraryOrTheReplicasChange) {

@@ -335,6 +335,13 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   reader.Finish();
 }
 
+void AvatarReplica::SkipTicks(std::uint64_t ticks, double length_s) {
+  STRIDEWIRE_CHECK(is_known_ && is_moving_ && !is_time_set_ && !may_have_layers_);
+  ahead_count_ = 0;
+  // Summed tick by tick, as in AdvanceAll.
+  for (std::uint64_t tick = 0; tick < ticks; ++tick) movement_time_s_ += length_s;
+}
+
 void AvatarReplica::PrefetchPose() const {
   if (!is_moving_) return;
   const ConstPoseSpan pose = AheadPose();

@@ -71,6 +71,10 @@ class AvatarReplica {
   static void AdvanceAll(std::span<AvatarReplica* const> replicas, const Tick& tick,
                          ReplicaEvaluator& evaluator);
 
+  /// Does the same as AdvanceAll for this number of ticks without poses. The replica must have a
+  /// movement and no layers.
+  void SkipTicks(std::uint64_t ticks, double length_s);
+
   /// True if the replica has received a state, and no error has occurred since then.
   [[nodiscard]] bool is_known() const { return is_known_; }
   /// The displayed pose in world space, after AdvanceAll for a tick with poses. Undefined unless
