@@ -4,9 +4,10 @@
 
 namespace stridewire::client {
 
-void MovementEvaluator::Add(const Movement& movement, double time_s, Vec3& root_position_m,
-                            std::span<Quat> rotations) {
-  batcher_.Add({.movement = &movement, .time_s = time_s}, 1,
+void MovementEvaluator::Add(const Movement& movement,
+                            const EvaluationBatcher::Similarity& similarity, double time_s,
+                            Vec3& root_position_m, std::span<Quat> rotations) {
+  batcher_.Add({.movement = &movement, .time_s = time_s}, similarity, 1,
                static_cast<std::uint32_t>(outputs_.size()));
   outputs_.push_back({&root_position_m, rotations.data()});
 }

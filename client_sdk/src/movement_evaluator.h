@@ -30,7 +30,11 @@ class MovementEvaluator {
   /// Adds a pose to evaluate. The movement and the memory of the pose must exist until Evaluate
   /// returns.
   void Add(const Movement& movement, double time_s, Vec3& root_position_m,
-           std::span<Quat> rotations);
+           std::span<Quat> rotations) {
+    Add(movement, EvaluationBatcher::SimilarityOf(movement), time_s, root_position_m, rotations);
+  }
+  void Add(const Movement& movement, const EvaluationBatcher::Similarity& similarity, double time_s,
+           Vec3& root_position_m, std::span<Quat> rotations);
 
   /// Evaluates all added poses and removes them.
   void Evaluate();

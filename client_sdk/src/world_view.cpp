@@ -313,6 +313,7 @@ void WorldView::BeginContinuing(Track& track) {
                      .ticks = ticks_,
                      .sampled = newest,
                      .stored = newest,
+                     .similarity = EvaluationBatcher::SimilarityOf(movement->movement),
                      .number = movement->number,
                      .standing = stamp.standing};
 }
@@ -557,18 +558,13 @@ void WorldView::SampleAll(double time_s, CrowdPose& out, DisplayCounts& displaye
   };
   for (auto& [shard, ticks] : shard_ticks_) ticks.FindSample(time_s);
   sampled_tracks_.clear();
-  constexpr std::size_t kPrefetched = 4;  // Movements are prefetched at this distance.
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (i + kPrefetched < tracks_.size()) {
-      const PlayedMovement* later = tracks_[i + kPrefetched].continued.movement;
-      if (later != nullptr) SoaPoseEvaluator::PrefetchTimes(later->movement);
-    }
     const std::size_t pose = sampled_tracks_.size();
     Track& track = tracks_[i];
     if (const auto movement_s = SampledTime(track.continued)) {
       track.continued.is_displayed = true;
-      evaluator_->Add(track.continued.movement->movement, *movement_s, out.roots_m[pose],
-                      rotations_of(pose));
+      evaluator_->Add(track.continued.movement->movement, track.continued.similarity, *movement_s,
+                      out.roots_m[pose], rotations_of(pose));
       sampled_tracks_.push_back({i, true});
       continue;
     }

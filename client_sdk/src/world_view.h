@@ -183,9 +183,11 @@ class WorldView : public PoseSink {
   struct Continued {
     const PlayedMovement* movement = nullptr;  ///< Null: the history contains all poses.
     const ShardTicks* ticks = nullptr;
-    MovementPoint sampled;     ///< Tick from which SampleAll computes the time of the movement.
-    MovementPoint stored;      ///< Newest tick in the history.
-    std::uint32_t number = 0;  ///< PlayedMovement::number, which is not in the cache.
+    MovementPoint sampled;  ///< Tick from which SampleAll computes the time of the movement.
+    MovementPoint stored;   ///< Newest tick in the history.
+    // Copies of data of the movement, which is in no processor cache.
+    EvaluationBatcher::Similarity similarity;
+    std::uint32_t number = 0;  ///< PlayedMovement::number
     bool standing = false;
     bool is_displayed = false;  ///< SampleAll has evaluated the movement.
   };

@@ -30,17 +30,22 @@ void EvaluationBatcher::Reserve(std::size_t runs) {
   sorted_.reserve(runs);
 }
 
-void EvaluationBatcher::Add(const SampleRun& run, int count, std::uint32_t tag) {
-  STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount);
-  STRIDEWIRE_CHECK(run.movement != nullptr && run.movement->group >= 0);
-  const Movement& movement = *run.movement;
-  const double part = std::clamp(run.time_s / movement.duration_s(), 0.0, 1.0);
+EvaluationBatcher::Similarity EvaluationBatcher::SimilarityOf(const Movement& movement) {
+  STRIDEWIRE_CHECK(movement.group >= 0);
+  return {movement.duration_s(), movement.feet.is_active,
+          static_cast<std::uint8_t>(static_cast<std::uint32_t>(movement.group) & 0xffu)};
+}
+
+void EvaluationBatcher::Add(const SampleRun& run, const Similarity& similarity, int count,
+                            std::uint32_t tag) {
+  STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount && run.movement != nullptr);
+  const double part = std::clamp(run.time_s / similarity.duration_s, 0.0, 1.0);
   // Runs without foot planting come first, and longer runs come before shorter ones.
-  auto key = movement.feet.is_active ? 1u : 0u;
+  auto key = similarity.is_planted ? 1u : 0u;
   key = key << 5 | static_cast<std::uint32_t>(kMaxCount - count);
-  key = key << 8 | (static_cast<std::uint32_t>(movement.group) & 0xffu);
+  key = key << 8 | similarity.group;
   key = key << 6 | static_cast<std::uint32_t>(part * (kParts - 1));
-  items_.push_back({run, key, tag, count});
+  items_.push_back({run, key, tag, count, similarity.is_planted});
 }
 
 void EvaluationBatcher::Sort() {
@@ -62,10 +67,10 @@ void EvaluationBatcher::Sort() {
 std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t begin) const {
   STRIDEWIRE_CHECK(begin < order_.size() && order_.size() == items_.size());
   std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
-  const bool is_planted = order_[begin].run.movement->feet.is_active;
+  const bool is_planted = order_[begin].is_planted;
   // Runs with planting come last, so a block ends before the first run that differs from its first
   // one.
-  while (order_[end - 1].run.movement->feet.is_active != is_planted) --end;
+  while (order_[end - 1].is_planted != is_planted) --end;
   // The first run of a block determines how many poses are evaluated, so no other run may be
   // longer.
   STRIDEWIRE_CHECK(order_[end - 1].count <= order_[begin].count);

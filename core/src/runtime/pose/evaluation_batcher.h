@@ -30,14 +30,28 @@ class EvaluationBatcher {
     std::uint32_t key = 0;  ///< Sort key. Similar runs have similar keys.
     std::uint32_t tag = 0;  ///< Identifies the run for the caller.
     int count = 1;          ///< Number of poses in the run.
+    bool is_planted = false;
   };
 
   /// Reserves memory for this number of runs. Up to that number, no other function allocates.
   void Reserve(std::size_t runs);
 
+  /// What the sort key of a run depends on, besides its time and its length.
+  struct Similarity {
+    double duration_s = 0.0;
+    bool is_planted = false;
+    std::uint8_t group = 0;
+  };
+  [[nodiscard]] static Similarity SimilarityOf(const Movement& movement);
+
   /// Adds a run of `count` poses, 1 to kMaxCount. Its movement must stay alive until Evaluate
   /// returns.
-  void Add(const SampleRun& run, int count, std::uint32_t tag);
+  void Add(const SampleRun& run, int count, std::uint32_t tag) {
+    Add(run, SimilarityOf(*run.movement), count, tag);
+  }
+  /// Same for a caller that has kept the result of SimilarityOf. Does not read the movement, which
+  /// is often in no processor cache.
+  void Add(const SampleRun& run, const Similarity& similarity, int count, std::uint32_t tag);
   [[nodiscard]] bool empty() const { return items_.empty(); }
 
   /// Evaluates all added runs in blocks of up to SoaPose::kLanes and then removes them. For each
