@@ -23,10 +23,6 @@ const states: readonly ClientState[] =
 const worldStates: readonly WorldState[] = ['pending', 'joining', 'joined', 'refused', 'left'];
 /** Messages that the module processes only in part. `onMessage` processes the rest. */
 const userMessages: readonly number[] = [MessageType.WorldInfo, MessageType.Events];
-/** Results of `state`. */
-const networkNames = [
-  'nextTimeS', 'connectDue', 'needsSocket', 'connectionNumber', 'outputBytes', 'addressIndex',
-] as const;
 
 /** Called with the reply to a command or inspection, and with the message that describes it. */
 type Answer = (reply: Reply, message?: Message) => void;
@@ -188,10 +184,16 @@ export class Session {
    * connect to the address with the index `addressIndex`. `needsSocket`: if not, close the socket.
    * `connectionNumber` increases with every connection.
    */
-  network(nowS = 0): {[name in (typeof networkNames)[number]]: number} {
+  network(nowS = 0): {
+    nextTimeS: number, connectDue: number, needsSocket: number, connectionNumber: number,
+    outputBytes: number, addressIndex: number,
+  } {
     native().call.state(this.client, nowS);
     const {results} = native();
-    return Object.fromEntries(networkNames.map((name, i) => [name, results[i]])) as never;
+    return {
+      nextTimeS: results[0]!, connectDue: results[1]!, needsSocket: results[2]!,
+      connectionNumber: results[3]!, outputBytes: results[4]!, addressIndex: results[5]!,
+    };
   }
 
   startConnecting(nowS: number): void {
