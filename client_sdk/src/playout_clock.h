@@ -42,7 +42,8 @@ class PlayoutClock {
   /// If an offset is smaller than all others in the window by more than this, the server's clock
   /// has changed, or the local clock was stopped.
   static constexpr double kSnapS = 0.25;
-  /// Without a jump, such an excess would take 20 times as long to disappear.
+  /// Maximum excess of d over its target. At kMaxRate, an excess takes 20 times its own duration to
+  /// disappear, so the display jumps if the excess remains larger than this for kResyncS.
   static constexpr double kMaxExcessS = 0.5;
 
   /// Adds a message with poses of server time `server_s` that arrived at `local_s`. The stream has

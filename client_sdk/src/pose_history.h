@@ -104,8 +104,9 @@ class PoseHistory {
   [[nodiscard]] const Vec3& root_position_m(std::size_t i) const { return pose(i).root_position_m; }
   [[nodiscard]] std::span<const Quat> rotations(std::size_t i) const { return pose(i).rotations; }
 
-  /// Prefetches the poses that Display will probably read. First call it with `is_near` false, and
-  /// later with true.
+  /// Prefetches what Display will probably read. Call it first with `is_near` false, which
+  /// prefetches the newest entry. A later call with `is_near` true reads that entry to find the
+  /// poses, and prefetches them.
   void Prefetch(double time_s, bool is_near) const;
   /// Prefetches what Push will probably read and write.
   void PrefetchPush() const;

@@ -27,8 +27,9 @@ class Session : public SessionCommands {
 
   // ---- The application calls these functions.
 
-  /// Starts to connect. `addresses` contains the texts of the servers' addresses, which the caller
-  /// connects to by their index. An empty list means one address without a text.
+  /// Starts to connect. `addresses` contains the servers' addresses as texts for messages. The
+  /// caller connects to the address with the index address_index(). An empty list means one address
+  /// without a text.
   stridewire_status Open(double now_s, std::vector<std::string> addresses = {});
   void Close(double now_s);
   stridewire_status Ping(double now_s);

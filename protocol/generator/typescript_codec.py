@@ -35,8 +35,8 @@ class TypeScriptCodec(TypeScript):
 
     def used_if(self, f, table, prefix="", unchecked=False):
         """The condition under which a message uses a field, or None. `prefix` precedes the names of
-        other properties. If they are `unchecked`, those that the message does not use may have
-        values as well."""
+        other properties. If `unchecked`, properties that the message does not use may have values
+        as well."""
         types = f.get("only", "").split()
 
         def has(name):

@@ -1,7 +1,7 @@
 #ifndef STRIDEWIRE_COMMANDS_H
 #define STRIDEWIRE_COMMANDS_H
 
-// What commands to a server contain. The functions that send them are in stridewire/client.h.
+// The contents of commands to a server. stridewire/client.h declares the functions that send them.
 
 #include <stddef.h>
 #include <stdint.h>

@@ -75,7 +75,7 @@ export interface ErrorMap {
 /** Describes what avatars can do with a library. */
 export interface Summary {
   readonly summary: {
-    /** One sentence per class of movements. */
+    /** What avatars can do, in one sentence per class of movements. */
     readonly sentences: readonly string[];
     readonly missing: readonly {readonly what: string; readonly advice: string}[];
   };
