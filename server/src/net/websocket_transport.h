@@ -14,8 +14,8 @@ using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_bo
 /// Sends each frame as one binary, uncompressed WebSocket message. The first Receive answers
 /// `request`, which must be a WebSocket upgrade; the peer must wait for the answer.
 ///
-/// The transport answers pings and joins fragments. It delivers a message in pieces as they
-/// arrive, so that an announced length does not allocate memory.
+/// The transport answers pings and accepts fragmented messages. It delivers a message in pieces as
+/// they arrive, so that an announced length does not allocate memory.
 [[nodiscard]] std::unique_ptr<Transport> MakeWebSocketTransport(boost::asio::ip::tcp::socket socket,
                                                                 UpgradeRequest request);
 

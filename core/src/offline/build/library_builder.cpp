@@ -310,7 +310,7 @@ class GroupConverter {
     }
   }
 
-  // Fits the weights of the stored examples and appends a view of them.
+  // Fits the weights of the stored examples of a group and appends its view to `views_`.
   Status AddView(const RawGroup& group, const std::vector<GridExample>& examples, bool is_smooth,
                  StoredGroup& stored) {
     MotionGroup view = stored.View();

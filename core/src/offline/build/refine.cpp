@@ -114,7 +114,8 @@ struct Pass {
   bool tries_own_radii = true;  // True if the pass tries several radii for each new site.
 };
 
-// Passes in the order in which they run. The first that reaches the requested error is the last.
+// Passes in the order in which they run. No further pass runs after one has reached the requested
+// error.
 constexpr std::array kAmendedPasses = {
     Pass{}, Pass{RadiusRule::kAllSites, 1.0, true, false}, Pass{RadiusRule::kAllSites, 1.0, true},
     Pass{RadiusRule::kExamples, 2.0}, Pass{RadiusRule::kExamples, 3.0}};

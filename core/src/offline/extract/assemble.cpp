@@ -212,7 +212,8 @@ class Assembler {
     return pool;
   }
 
-  // Returns true if there are climbing steps, but too few for a group.
+  // Adds the groups of steps to `library`. Returns true if there are climbing steps, but too few
+  // for a group.
   bool AddStepGroups(RawLibrary& library) const {
     bool has_dropped_climbs = false;
     constexpr Foot kFeet[] = {Foot::kLeft, Foot::kRight};

@@ -34,7 +34,7 @@ bool IsWord(std::string_view name, std::size_t at) {
   return begins && ends && name.size() > 1;
 }
 
-// Finds the words for left and right.
+// Finds the words for left and right in a name.
 std::vector<SideInName> SideWordsOf(std::string_view name) {
   std::vector<SideInName> sides;
   for (const auto& [left, right] : kSideWords) {
@@ -48,7 +48,7 @@ std::vector<SideInName> SideWordsOf(std::string_view name) {
   return sides;
 }
 
-// Finds the single letters that may stand for left or right.
+// Finds the single letters in a name that may stand for left or right.
 std::vector<SideInName> SideLettersOf(std::string_view name) {
   constexpr std::string_view kLetters = "LRlr";
   constexpr std::string_view kOthers = "RLrl";

@@ -67,7 +67,7 @@ class SolePoints {
   std::array<SolePoint, std::size_t{kRows} * kColumns> points_{};
 };
 
-// The plane height = ball_height + at_ball + side_slope * side + forward_slope * forward.
+// A plane: height = ball_height + at_ball + side_slope * side + forward_slope * forward.
 struct Plane {
   double at_ball = 0.0;
   double side_slope = 0.0;
