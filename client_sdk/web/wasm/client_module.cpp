@@ -1,11 +1,12 @@
 // The functions of the WebAssembly module, which the web client calls. src/native.ts declares them.
 //
 // Received messages are passed as frames (protocol/STANDARD.md): the web client passes a frame to
-// `on_frame`, which verifies it, and then reads the fields from the frame. Of messages that the web
-// client makes, it passes the type and the payload. Numbers that a function
-// returns besides its result are in `results`; the comment of each function lists them after
-// "results:", each with its index. A text has results[kTextBytes] bytes and begins at address
-// results[kTextAt].
+// `on_frame`, which verifies it, and then reads the fields from the frame. For a message that the
+// web client has made, it passes the type and the payload.
+//
+// Numbers that a function returns besides its result are in `results`; the comment of each function
+// lists them after "results:", each with its index. A text has results[kTextBytes] bytes and begins
+// at address results[kTextAt].
 
 #include <algorithm>
 #include <array>
@@ -538,9 +539,9 @@ std::uint32_t Sample(Client* client, stridewire_world world, protocol::AvatarId 
   return sampled->interpolated ? 1 : sampled->extrapolated ? 3 : 2;
 }
 
-/// Samples all avatars of a world and returns their number, from the recording if `recorded`.
-/// results: 0 number of joints, 1 address of the ids, 2 of the flags, 3 of the roots, 4 of the
-/// rotations. The memory is valid until the next call of this function.
+/// Samples all avatars of a world, from its recording if `recorded`. Returns their number. results:
+/// 0 number of joints, 1 address of the ids, 2 of the flags, 3 of the roots, 4 of the rotations.
+/// The memory is valid until the next call of this function.
 STRIDEWIRE_EXPORT(sample_all)
 std::size_t SampleAll(Client* client, stridewire_world world, double time_s, bool recorded) {
   WorldView* view = client->session.FindWorld(world);

@@ -68,8 +68,8 @@ std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t 
   STRIDEWIRE_CHECK(begin < order_.size() && order_.size() == items_.size());
   std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
   const bool is_planted = order_[begin].is_planted;
-  // Runs with planting come last, so a block ends before the first run that differs from its first
-  // one.
+  // All runs of a block must have planting, or none. Runs with planting come last, so a block that
+  // begins without planting ends before the first of them.
   while (order_[end - 1].is_planted != is_planted) --end;
   // The first run of a block determines how many poses are evaluated, so no other run may be
   // longer.

@@ -36,7 +36,7 @@ class EvaluationBatcher {
   /// Reserves memory for this number of runs. Up to that number, no other function allocates.
   void Reserve(std::size_t runs);
 
-  /// What the sort key of a run depends on, besides its time and its length.
+  /// Properties on which the sort key of a run depends, besides its time and its length.
   struct Similarity {
     double duration_s = 0.0;
     bool is_planted = false;
