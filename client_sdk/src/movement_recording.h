@@ -34,8 +34,8 @@ class MovementRecording {
 
   /// Records the pose of an avatar that has a movement and no layers, at `time_s` in the movement.
   /// Stores the movement unless the pose continues that of `cursor`. `tick_s` is the length of a
-  /// tick. Ticks must not decrease, except for small differences between shards. Ticks may be
-  /// omitted while a movement continues, but not kMaxTicks of them.
+  /// tick. Ticks must not decrease, except for small differences between shards. While a movement
+  /// continues, fewer than kMaxTicks successive ticks may be omitted.
   void Add(protocol::AvatarId avatar, const PoseStamp& stamp,
            const std::shared_ptr<const PlayedMovement>& movement, double time_s,
            const std::shared_ptr<const MotionLibrary>& library, double tick_s, Cursor& cursor);

@@ -384,7 +384,7 @@ void WorldView::UpdateContinued(const protocol::Movements& movements) {
   const std::uint64_t number = recording_.movements().number();
   if (std::exchange(recording_number_, number) != number) EndContinuingAll();
 
-  // Tracks are visited at this interval in ticks.
+  // Each track is visited once in this number of ticks.
   constexpr std::uint64_t kTicks = 16;
   constexpr std::uint64_t kMaxAge = 64;
   static_assert(kMaxAge + kTicks < std::tuple_size_v<decltype(ShardTicks::ring)>);

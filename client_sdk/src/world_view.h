@@ -189,7 +189,7 @@ class WorldView : public PoseSink {
     EvaluationBatcher::Similarity similarity;
     std::uint32_t number = 0;  ///< PlayedMovement::number
     bool standing = false;
-    bool is_displayed = false;  ///< SampleAll has evaluated the movement.
+    bool is_displayed = false;  ///< True if SampleAll has evaluated the movement.
   };
   struct Track {
     // The members that are read in every tick come first.
@@ -265,8 +265,8 @@ class WorldView : public PoseSink {
   /// Adds all poses to the history, which then determines the motion. The next tick calls OnPose.
   void EndContinuing(Track& track);
   void EndContinuingAll();
-  /// Visits a part of the tracks per tick, so that the ticks of continued movements are added to
-  /// histories and recordings while they are known.
+  /// Adds the ticks of continued movements to histories and recordings, before ShardTicks drops
+  /// these ticks. Each call visits a part of the tracks.
   void UpdateContinued(const protocol::Movements& movements);
   /// Copies the movement of an avatar unless the track has it already.
   static void KeepMovement(Track& track, const AvatarReplica& replica);
@@ -315,8 +315,8 @@ class WorldView : public PoseSink {
   ShardTicks* ticks_ = nullptr;
   std::vector<protocol::AvatarId> ended_;  // See TakeEnded.
   std::uint64_t recording_number_ = 0;     // MovementRecording::number() at the last message.
-  std::uint64_t updated_tick_ = 0;         // Tick of the last UpdateContinued,
-  std::size_t updated_track_ = 0;          // and the track where the next one starts.
+  std::uint64_t updated_tick_ = 0;         // Tick of the last UpdateContinued.
+  std::size_t updated_track_ = 0;          // Track at which the next UpdateContinued starts.
   double tick_s_ = 0.0;                    // Length of a tick of the last replicas.
   double sampled_s_ = 0.0;                 // Time of the last SampleAll.
   struct SampledTrack {

@@ -81,8 +81,8 @@ void ReplicaSet::EmitPose(const protocol::Movements& message, Avatar& avatar, Po
 }
 
 // Advances the avatars in `due_` by one tick. Passes their poses to the sink if `emits` is true and
-// the sink needs the tick. If the message contains no states, all other avatars of the shard are
-// continued by the sink.
+// the sink needs the tick. If the message contains no states, the sink continues the movements of
+// all other avatars of the shard.
 void ReplicaSet::AdvanceDue(const protocol::Movements& message, Shard& shard, bool emits,
                             PoseSink& sink) {
   const std::uint64_t every_n_ticks = sink.EveryNTicks();

@@ -18,9 +18,9 @@ class PoseSink {
   virtual ~PoseSink() = default;
 
   /// Called when an avatar has a new pose, replica.pose(). `replica` is valid until the call
-  /// returns. If the function returns true, the sink itself continues the movement, and the set
-  /// does not advance the replica until its next record. The avatar must have a movement and no
-  /// layers.
+  /// returns. If the avatar has a movement and no layers, the function may return true. The sink
+  /// then continues the movement itself, and the set does not advance the replica until its next
+  /// record.
   virtual bool OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                       const AvatarReplica& replica) = 0;
 
@@ -88,7 +88,7 @@ class ReplicaSet {
     bool discontinuity = true;
     // True if the sink continues the movement. The replica is then at `step`.
     bool is_continued = false;
-    bool is_ended = false;  // True if the sink no longer continues it.
+    bool is_ended = false;  // True if the sink no longer continues the movement.
     std::uint64_t step = 0;
   };
   struct Shard {
