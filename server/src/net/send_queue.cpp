@@ -51,9 +51,9 @@ std::size_t SendQueue::PushPoses(PoseFrames&& batch) {
     dropped += lane.front().left();
     lane.pop_front();
   }
-  STRIDEWIRE_CHECK(dropped <= waiting_batches_);
-  waiting_batches_ += batch.frames.size();
-  waiting_batches_ -= dropped;
+  STRIDEWIRE_CHECK(dropped <= waiting_pose_frames_);
+  waiting_pose_frames_ += batch.frames.size();
+  waiting_pose_frames_ -= dropped;
   lane.push_back({std::move(batch.frames), 0, batch.avatar_count});
   return dropped;
 }
@@ -89,8 +89,8 @@ void SendQueue::DropPoses(WorldId world, protocol::PoseMode mode) {
   std::erase_if(lanes_, [&](const auto& item) {
     if (item.first.world != world || item.first.mode != mode) return false;
     for (const Batch& batch : item.second) {
-      STRIDEWIRE_CHECK(batch.left() > 0 && batch.left() <= waiting_batches_);
-      waiting_batches_ -= batch.left();
+      STRIDEWIRE_CHECK(batch.left() > 0 && batch.left() <= waiting_pose_frames_);
+      waiting_pose_frames_ -= batch.left();
     }
     return true;
   });
@@ -98,7 +98,7 @@ void SendQueue::DropPoses(WorldId world, protocol::PoseMode mode) {
 
 void SendQueue::DropAllPoses() {
   lanes_.clear();
-  waiting_batches_ = 0;
+  waiting_pose_frames_ = 0;
 }
 
 void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
@@ -127,14 +127,14 @@ void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
   std::size_t pose_bytes = 0;
   std::size_t pose_frames = 0;
   auto lane = lanes_.upper_bound(last_lane_);
-  while (waiting_batches_ > 0 && pose_bytes < max_bytes && pose_frames < kMaxGatheredFrames) {
+  while (waiting_pose_frames_ > 0 && pose_bytes < max_bytes && pose_frames < kMaxGatheredFrames) {
     if (lane == lanes_.end()) lane = lanes_.begin();
     if (!lane->second.empty()) {
       Batch& batch = lane->second.front();
       SharedFrame frame = std::move(batch.parts[batch.next_part++]);
       pose_bytes += frame->size();
       ++pose_frames;
-      --waiting_batches_;
+      --waiting_pose_frames_;
       out.frames.push_back(std::move(frame));
       ++out.batches;
       if (batch.left() == 0) {

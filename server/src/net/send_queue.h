@@ -82,12 +82,12 @@ class SendQueue {
   void Gather(std::size_t max_bytes, Gathered& out);
 
   [[nodiscard]] bool empty() const {
-    return control_.empty() && terrains_.empty() && movements_.empty() && waiting_batches_ == 0;
+    return control_.empty() && terrains_.empty() && movements_.empty() && waiting_pose_frames_ == 0;
   }
   [[nodiscard]] bool control_empty() const { return control_.empty(); }
   [[nodiscard]] std::size_t control_bytes() const { return control_bytes_; }
   [[nodiscard]] std::size_t movement_bytes() const { return movement_bytes_; }
-  [[nodiscard]] std::size_t waiting_batches() const { return waiting_batches_; }
+  [[nodiscard]] std::size_t waiting_pose_frames() const { return waiting_pose_frames_; }
 
  private:
   struct LaneKey {
@@ -120,8 +120,8 @@ class SendQueue {
   std::deque<QueuedMovements> movements_;
   std::size_t movement_bytes_ = 0;
   std::map<LaneKey, Lane> lanes_;
-  std::size_t waiting_batches_ = 0;  // Number of frames in all lanes.
-  LaneKey last_lane_;                // Lane at which the last Gather stopped.
+  std::size_t waiting_pose_frames_ = 0;  // In all lanes.
+  LaneKey last_lane_;                    // Lane at which the last Gather stopped.
 };
 
 }  // namespace stridewire::server

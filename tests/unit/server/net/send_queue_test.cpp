@@ -79,7 +79,7 @@ TEST(SendQueue, KeepsTheLatestTicksForASlowObserver) {
   std::size_t dropped = 0;
   for (int tick = 1; tick <= 100; ++tick) {
     dropped += queue.PushPoses(Batch(tick));
-    EXPECT_LE(queue.waiting_batches(), 3u);
+    EXPECT_LE(queue.waiting_pose_frames(), 3u);
   }
   EXPECT_EQ(dropped, 97u);
   SendQueue::Gathered out;
@@ -107,9 +107,9 @@ TEST(SendQueue, DropsOnlyBatchesOfTheSameWorldShardAndMode) {
   EXPECT_EQ(queue.PushPoses(Batch(1, {.mode = PoseMode::kQuantised})), 0u);
   EXPECT_EQ(queue.PushPoses(Batch(2)), 0u);
   EXPECT_EQ(queue.PushPoses(Batch(3)), 1u);
-  EXPECT_EQ(queue.waiting_batches(), 5u);
+  EXPECT_EQ(queue.waiting_pose_frames(), 5u);
   queue.DropPoses(1, PoseMode::kFull);
-  EXPECT_EQ(queue.waiting_batches(), 2u);
+  EXPECT_EQ(queue.waiting_pose_frames(), 2u);
   queue.DropAllPoses();
   EXPECT_TRUE(queue.empty());
 }
