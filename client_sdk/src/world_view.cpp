@@ -412,7 +412,7 @@ void WorldView::UpdateContinued(const protocol::Movements& movements) {
     Flush(track);
     if (ticks.count - continued.sampled.tick > kMaxAge) continued.sampled = continued.stored;
     if (is_recorded) continue;
-    track.recorded = {};  // Stores the movement again.
+    track.recorded = {};  // Without a cursor, Add stores the movement again.
     const PoseStamp& newest = track.history.stamp(track.history.size() - 1);
     recording_.movements().Add(track.avatar, newest, track.movement, continued.stored.time_s,
                                evaluator_->library(), tick_s_, track.recorded);

@@ -185,7 +185,7 @@ class WorldView : public PoseSink {
     const ShardTicks* ticks = nullptr;
     MovementPoint sampled;  ///< Tick from which SampleAll computes the time of the movement.
     MovementPoint stored;   ///< Newest tick in the history.
-    // Copies of data of the movement, which is in no processor cache.
+    // Copies of data of the movement, which is not in the processor's cache.
     EvaluationBatcher::Similarity similarity;
     std::uint32_t number = 0;  ///< PlayedMovement::number
     bool standing = false;
@@ -317,7 +317,7 @@ class WorldView : public PoseSink {
   std::uint64_t recording_number_ = 0;     // MovementRecording::number() at the last message.
   std::uint64_t updated_tick_ = 0;         // Tick of the last UpdateContinued.
   std::size_t updated_track_ = 0;          // Track at which the next UpdateContinued starts.
-  double tick_s_ = 0.0;                    // Length of a tick of the last replicas.
+  double tick_s_ = 0.0;                    // ReplicaSet::tick_s() in the last Apply.
   double sampled_s_ = 0.0;                 // Time of the last SampleAll.
   struct SampledTrack {
     std::size_t track;

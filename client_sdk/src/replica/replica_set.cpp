@@ -97,8 +97,8 @@ void ReplicaSet::AdvanceDue(const protocol::Movements& message, Shard& shard, bo
                              .only_layered = sink.EvaluatesMovements()},
                             evaluator_);
   if (!has_poses) return;
-  // The poses and the memory of the sink are usually in no processor cache. They are prefetched
-  // this many avatars ahead.
+  // The poses and the memory of the sink are usually not in the processor's cache. They are
+  // prefetched this many avatars ahead.
   constexpr std::size_t kPrefetched = 2;
   const auto prefetch = [&](std::size_t i) {
     if (i >= due_.size()) return;

@@ -267,7 +267,7 @@ void Connection::CloseGently(CloseCode code) {
   handler_ = nullptr;
   closing_since_ = Clock::now();
   queue_.DropAllPoses();
-  // Further received bytes are discarded.
+  // Reading continues until the peer closes. The received bytes are discarded.
   if (!is_processing_)
     Read();
   else

@@ -220,8 +220,9 @@ std::uint64_t SessionStream::SendEvents(protocol::Events&& message) {
 void SessionStream::CountDroppedEvents(WorldId world, std::uint64_t events) {
   if (events == 0) return;
   if (context_.connection != nullptr) context_.host.metrics().Reached(Limit::kControlBuffer);
-  // Dropped events that were stored may belong to another world of the session. Only the total over
-  // all worlds matters.
+  // If the replay buffer drops stored messages, their events may belong to another world of the
+  // session. They are counted for `world` nevertheless, because only the total over all worlds
+  // matters.
   context_.worlds.at(world).dropped_events += events;
   context_.host.metrics().events_dropped.Add(events);
 }

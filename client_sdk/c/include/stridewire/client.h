@@ -327,7 +327,7 @@ typedef struct stridewire_parameters {
   uint8_t count;  ///< Number of valid entries in `values` and `names`.
 } stridewire_parameters;
 
-/// How a requested movement ended.
+/// How a requested movement ended. Comments begin with the type of the event that reports it.
 typedef enum stridewire_outcome {
   STRIDEWIRE_OUTCOME_NONE = 0,  ///< The event does not end a request.
   /// FINISHED: the movement was played to its end, or the walk has arrived.
@@ -371,7 +371,7 @@ typedef struct stridewire_event {
   stridewire_parameters applied;    ///< Parameters of the synthesized movement.
   double rtt_s;                     ///< Round-trip time of a ping.
   uint64_t dropped_batches;         ///< Pose batches that the server has dropped since the join.
-  uint64_t dropped_events;          ///< Event messages that the server has dropped since the join.
+  uint64_t dropped_events;          ///< Events that the server has dropped since the join.
   uint64_t events_dropped_before;  ///< Events that the full queue dropped directly before this one.
   char text[STRIDEWIRE_MAX_TEXT_BYTES];
   /// Distance between the requested place and the nearest one in reach, in metres.

@@ -7,7 +7,7 @@ import type {SkeletonLike, Vec} from './body_parts.js';
 import {Region} from './body_mesh.js';
 
 export interface StickFigure {
-  /** Number of joints and extra points together. */
+  /** Number of points: the joints that lines use, and the extra points. */
   readonly pointCount: number;
   /** Pairs of point indices. */
   readonly lines: readonly number[];

@@ -89,7 +89,7 @@ export class WorldView {
   private readonly rings = makeRings(decalCapacity);
   private readonly options: ViewOptions;
   private readonly colours: ViewColours;
-  /** Foot balls at `previousTimeS`, 6 numbers per avatar. */
+  /** Positions of the balls of both feet at `previousTimeS`, 6 numbers per avatar. */
   private previousBalls = new Float32Array(0);
   private previousAvatars = new Uint32Array(0);
   /** Two numbers per avatar, for its left and right foot: 1 if the foot is planted. */

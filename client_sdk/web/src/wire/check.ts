@@ -46,7 +46,7 @@ export function truth(value: unknown, at: Place): boolean {
   return typeof value === 'boolean' ? value : at.fail('expected true or false');
 }
 
-/** Checks that a bool that its message does not use is false or absent. `why` is the error text. */
+/** Checks a flag that the message does not use: false or absent. `why` is the error text. */
 export function unused(value: unknown, at: Place, why: string): null {
   return (value ?? false) === false ? null : at.fail(why);
 }

@@ -49,8 +49,8 @@ struct RawLibrary {
   Skeleton skeleton;
   /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
   Pose stand_pose;
-  /// Height differences by which the soles of `stand_pose` deviate from flat soles; 0 if they are
-  /// flat. If the soles are tilted too far, CompleteLibrary replaces the stand pose.
+  /// Sum of the deviations of the ankle and toe heights in `stand_pose` from those of flat feet; 0
+  /// if the feet are flat. If it is too large, CompleteLibrary replaces the stand pose.
   double stand_tilt_m = 0.0;
   std::vector<RawGroup> groups;
   std::vector<RawLayer> layers;

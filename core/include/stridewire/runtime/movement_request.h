@@ -83,8 +83,8 @@ struct WalkRequest {
 /// Determines when a request begins, and whether it replaces earlier requests.
 enum class Interrupt : std::uint8_t {
   kNone,  ///< The request begins after all queued requests.
-  /// The request begins after the current movement. A current stand or walk ends. The queue is
-  /// dropped.
+  /// The request begins after the current step or jump. A current stand ends at once, and a walk
+  /// ends after its current step. The queue is dropped.
   kAfterMovement,
   /// The request begins at once if both feet stand, and otherwise as soon as they have landed. The
   /// queue is dropped.

@@ -27,15 +27,15 @@ constexpr double kMotionCos = 0.85;
 constexpr double kWeakMotionCos = 0.35;
 // The following distances are in leg lengths.
 constexpr double kAtZero = 0.12;  // A floor at most this far from zero counts as a floor at zero.
-// A figure travels horizontally if it moves at least kMinTravel along that axis, and at least
-// kTravelRatio times as far as along the up axis.
+// A figure travels horizontally if it moves at least kMinTravel along the other candidate for the
+// up axis, and at least kTravelRatio times as far as along the up axis (StandsAlong).
 constexpr double kMinTravel = 0.6;
 constexpr double kTravelRatio = 2.0;
 // A figure on a level floor moves less than this along the up axis.
 constexpr double kMaxRise = 0.3;
-// The fixed rotation of the joints above the root is applied to the up axis of the rest pose if
-// this brings the axis closer to the mean direction from the feet to the hips: the cosine of the
-// angle between them must increase by at least this much (RestUpInWorld).
+// If no floor decides it, the fixed rotation of the joints above the root is applied to the up axis
+// of the rest pose if this brings the axis closer to the mean direction from the feet to the hips:
+// the cosine of the angle between them must increase by at least this much (RestUpInWorld).
 constexpr double kClearGain = 0.5;
 // If the sum of the two unit foot vectors is shorter than this, the feet have no common direction.
 constexpr double kClearFeet = 0.5;

@@ -39,7 +39,7 @@ struct ExtractOptions {
   const Skeleton* target = nullptr;
 };
 
-/// A usable movement of a capture in the frame in which it starts, with all parameters of its kind.
+/// A usable movement of a capture, relative to its base frame, with all parameters of its kind.
 struct ExtractedExample {
   MovementKind kind = MovementKind::kStepLeft;
   RawExample example;
@@ -112,8 +112,8 @@ inline constexpr ParameterName kJumpParameters[] = {ParameterName::kLength, Para
 void MeasureStepParameters(const Skeleton& skeleton, std::span<const ParameterName> names,
                            Foot moving, RawExample& step);
 
-/// Finds the steps and standing jumps of a capture and cuts them out as examples, each in the frame
-/// in which it starts.
+/// Finds the steps and standing jumps of a capture and cuts them out as examples, each relative to
+/// the base frame in which it starts.
 ///
 /// Steps keep the frame rate of the capture. Their keytimes are start, toe-off, heel-strike and
 /// end. They start in the stride heading of their first frame. Heights are relative to the ground

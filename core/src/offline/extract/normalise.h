@@ -5,8 +5,8 @@
 
 namespace stridewire {
 
-/// Cuts frames out of a clip and transforms them to the frame in which a movement starts (paper,
-/// Section 5):
+/// Cuts frames out of a clip and transforms them to the base frame in which a movement starts
+/// (paper, Section 5):
 ///
 ///   r_root <- q_h^-1 r_root,   t <- q_h^-1 (t - t_0),   q_h = rotation by `heading_rad` about +Y
 ///

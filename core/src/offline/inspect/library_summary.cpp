@@ -199,7 +199,7 @@ class Summarizer {
 constexpr const char* kMirrorAdvice =
     "Add the option --mirror to the build, or record these movements, too.";
 
-// Collects what is missing on one side or on both.
+// Collects the movements that the library lacks on one side or on both.
 class MissingFinder {
  public:
   explicit MissingFinder(LibrarySummary& summary) : summary_(summary) {}

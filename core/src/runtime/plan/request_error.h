@@ -16,7 +16,7 @@ struct LandingConditions {
 
 /// The predicted result of a planned step or jump, and its difference from the request.
 struct RequestError {
-  RequestTarget reached;    ///< Result of the step or jump, in the terms of its request.
+  RequestTarget reached;    ///< Result of the step or jump, in the form of its target.
   double distance_m = 0.0;  ///< Distance between the landing places, >= 0.
   /// Angle between the paths to the landing places, or between the headings, whichever is larger;
   /// >= 0. Paths are compared only if the landing places differ and are not close to the start.

@@ -50,7 +50,7 @@ class EvaluationBatcher {
     Add(run, SimilarityOf(*run.movement), count, tag);
   }
   /// Same for a caller that has kept the result of SimilarityOf. Does not read the movement, which
-  /// is often in no processor cache.
+  /// is often not in the processor's cache.
   void Add(const SampleRun& run, const Similarity& similarity, int count, std::uint32_t tag);
   [[nodiscard]] bool empty() const { return items_.empty(); }
 

@@ -58,10 +58,10 @@ inline constexpr float kMaxRootM = 131'071.0f;
 /// Largest error of a quantised rotation in radians. The error of a component is at most 2.2e-5.
 ///
 /// Each joint is encoded as three little-endian u16. The component with the largest magnitude is
-/// dropped; of equal components, the first one. If it is negative, the quaternion is negated
-/// before. Each other component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so that
-/// 0 is exact. Bit 15 of the first and second word are bits 0 and 1 of the dropped index; bit 15 of
-/// the third word is 0.
+/// dropped; if several are equal, the first. If it is negative, the quaternion is negated first.
+/// Each other component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so that 0 is
+/// exact. Bit 15 of the first and second word are bits 0 and 1 of the dropped index; bit 15 of the
+/// third word is 0.
 inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
 
 /// Largest deviation of a quaternion's length from 1.
