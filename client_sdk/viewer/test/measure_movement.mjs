@@ -77,15 +77,23 @@ try {
     return new Map(processInfo.filter(({type}) => type === 'renderer')
       .map(({id, cpuTime}) => [id, cpuTime]));
   };
-  // Other renderers belong to no page. The renderer of this one is the one that this loop uses.
-  const idleS = await rendererTimesS();
-  await page.evaluate(() => {
-    const endMs = performance.now() + 1000;
-    while (performance.now() < endMs);
-  });
-  const usedS = ([id, time]) => time - (idleS.get(id) ?? 0);
-  const [pageProcess] = [...await rendererTimesS()].reduce(
-    (most, each) => (usedS(each) > usedS(most) ? each : most));
+  // Other renderers belong to no page. The renderer of this one is the one that the loop uses. If
+  // another one is busy at the same time, for example because it starts, the loop is repeated.
+  let pageProcess;
+  for (let attempt = 1; pageProcess === undefined; ++attempt) {
+    const idleS = await rendererTimesS();
+    await page.evaluate(() => {
+      const endMs = performance.now() + 1000;
+      while (performance.now() < endMs);
+    });
+    const used = [...await rendererTimesS()].map(([id, time]) => [id, time - (idleS.get(id) ?? 0)])
+      .sort(([, a], [, b]) => b - a);
+    if (used[0][1] > 0.3 && (used.length === 1 || used[1][1] < 0.5 * used[0][1])) {
+      [[pageProcess]] = used;
+    } else if (attempt === 20) {
+      throw new Error(`cannot find the page's renderer: ${JSON.stringify(used)}`);
+    }
+  }
   await sleep(3);
   await page.evaluate((a) => globalThis.start(...a),
     [`ws://127.0.0.1:${httpPort}/stream`, mode, recordingS, everyNTicks]);
