@@ -34,6 +34,7 @@ void WorldView::ClearPoses() {
   EraseTracks([](const Track&) { return true; });
   shards_.clear();
   shard_ticks_.clear();
+  updated_tick_ = 0;  // The ticks of another server may be lower.
   left_.clear();
   newest_time_s_ = -std::numeric_limits<double>::infinity();
 }

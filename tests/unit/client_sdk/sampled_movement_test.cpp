@@ -273,6 +273,30 @@ TEST_F(SampledMovementTest, RecordsTheSamePoses) {
   }
 }
 
+TEST_F(SampledMovementTest, RecordsTheSamePosesAfterAServerRestart) {
+  for (int i = 0; i < 1000; ++i) Advance();
+  // The tick numbers of the new server are lower.
+  tick_ = 0;
+  const auto library = OpenLibrary("builtin").value();
+  for (Viewer* viewer : {&every_tick_, &when_sampled_}) {
+    viewer->replicas = ReplicaSet(library, kIntervalS, kAvatars);
+    viewer->view.ClearPoses();
+    viewer->view.recording().Clear();
+    viewer->Receive(States(), 1);
+  }
+  // Movements that last longer than the recordings.
+  for (int i = 0; i < 600; ++i) {
+    ++tick_;
+    protocol::Movements message = Empty();
+    message.step = tick_;
+    every_tick_.Receive(message, 1);
+    when_sampled_.Receive(message, 1);
+    when_sampled_.Sample(now_s() - 1.4 * kIntervalS);
+    if (i % 10 != 0) continue;
+    ASSERT_NO_FATAL_FAILURE(ExpectSameRecordings(0.0));
+  }
+}
+
 TEST_F(SampledMovementTest, KeepsPosesIfTheLibraryOrTheReplicasChange) {
   for (int i = 0; i < 40; ++i) {
     Advance();
