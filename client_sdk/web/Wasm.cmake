@@ -79,11 +79,12 @@ stridewire_wasm_object(quantise_kernel ${PROJECT_SOURCE_DIR}/protocol/src/quanti
 stridewire_wasm_object(pose_kernels ${PROJECT_SOURCE_DIR}/core/src/runtime/pose/pose_kernels.cpp)
 
 # The stack is at the start of the memory, so a stack overflow stops the module instead of
-# overwriting data.
+# overwriting data. With an option -O, clang would also run wasm-opt where that program is
+# installed, and the module would depend on the machine.
 set(web_wasm ${CMAKE_CURRENT_SOURCE_DIR}/build/client.wasm)
 add_custom_command(OUTPUT ${web_wasm}
   COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_CURRENT_SOURCE_DIR}/build
-  COMMAND ${STRIDEWIRE_WASM_CXX} --target=wasm32-wasi -O2 -mexec-model=reactor -fno-exceptions
+  COMMAND ${STRIDEWIRE_WASM_CXX} --target=wasm32-wasi -mexec-model=reactor -fno-exceptions
           -Wl,--gc-sections,--strip-all,--stack-first,-z,stack-size=1048576
           ${wasm_objects} -o ${web_wasm}
   DEPENDS ${wasm_objects}
