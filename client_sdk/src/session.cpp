@@ -65,14 +65,30 @@ bool Session::HandleFrame(const protocol::FrameView& frame, double now_s) {
   return connection == connection_number_ && Receives();
 }
 
-void Session::OnFrame(std::span<const std::byte> frame, double now_s) {
+void Session::OnMessage(std::span<const std::byte> message, double now_s) {
   answered_command_ = 0;
   if (!Receives()) return;
   heard_s_ = now_s;
-  bytes_received_ += frame.size();
-  const auto view = protocol::ParseFrame(frame, protocol::Sender::kServer);
-  if (!view) return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(view.error()), now_s);
-  if (HandleFrame(*view, now_s)) Pump();
+  bytes_received_ += message.size();
+  for (bool is_first = true; is_first || !message.empty(); is_first = false) {
+    const auto frame = reader_->Next(message);
+    if (!frame) return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(frame.error()), now_s);
+    if (!*frame) {
+      return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
+                            "the server sent a WebSocket message that ends within a frame", now_s);
+    }
+    const protocol::MessageType type = (*frame)->type;
+    const bool is_alone = is_first && message.empty();
+    if (!is_alone && type != protocol::MessageType::kPoseBatch &&
+        type != protocol::MessageType::kMovements) {
+      return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
+                            "the server sent a WebSocket message with several frames, of which one "
+                            "is neither PoseBatch nor Movements",
+                            now_s);
+    }
+    if (!HandleFrame(**frame, now_s)) return;
+  }
+  Pump();
 }
 
 void Session::OnBytes(std::span<const std::byte> bytes, double now_s) {

@@ -43,10 +43,10 @@ class Session : public SessionCommands {
   [[nodiscard]] std::size_t address_index() const { return address_; }
   void OnConnected(double now_s);
   void OnBytes(std::span<const std::byte> bytes, double now_s);
-  /// Same as OnBytes for transports that keep frames apart, such as WebSocket. `frame` must be one
-  /// complete frame and begin on a multiple of 8 bytes.
-  void OnFrame(std::span<const std::byte> frame, double now_s);
-  /// Returns the command or inspection of the application that the frame of the last OnFrame
+  /// Same as OnBytes for a message of a WebSocket. It must contain one frame, or several of types
+  /// PoseBatch and Movements. No frame may continue in the next message.
+  void OnMessage(std::span<const std::byte> message, double now_s);
+  /// Returns the command or inspection of the application that the frame of the last OnMessage
   /// answered. Returns 0 for other frames, and for a Reply to a command of the session itself.
   [[nodiscard]] std::uint64_t answered_command() const { return answered_command_; }
   /// Must be called when the attempt to connect has failed or the connection was lost.

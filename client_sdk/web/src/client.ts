@@ -197,7 +197,7 @@ export class Client {
     socket.onmessage = ({data}: {data: unknown}) => {
       if (socket !== this.socket) return;
       if (data instanceof ArrayBuffer) {
-        session.onFrame(data, this.nowS());
+        session.onFrames(data, this.nowS());
       } else {
         session.onInvalid('The server sent a text message.', this.nowS());
       }

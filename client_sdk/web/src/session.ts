@@ -204,18 +204,21 @@ export class Session {
     this.run(() => native().call.on_connected(this.client, nowS));
   }
 
-  /** Processes a received frame. Never throws, whatever the frame contains. */
-  onFrame(frame: ArrayBuffer, nowS: number): void {
+  /**
+   * Processes a received message: one frame, or several frames with poses or movements. Never
+   * throws, whatever the message contains.
+   */
+  onFrames(frame: ArrayBuffer, nowS: number): void {
     if (this.state !== 'handshake' && this.state !== 'ready') return;
-    ++this.total.framesReceived;
     const type = typeOfFrame(frame);
+    this.total.framesReceived += countFrames(frame);
     const hasPoses = type === MessageType.PoseBatch || type === MessageType.Movements;
     if (hasPoses) this.total.poseBytesReceived += frame.byteLength;
     if (type === MessageType.LibraryPiece) this.total.libraryBytesReceived += frame.byteLength;
     const startedMs = hasPoses ? this.precisionNowMs() : 0;
     this.run(() => {
       native().setInput(new Uint8Array(frame));
-      this.answered = native().call.on_frame(this.client, frame.byteLength, nowS);
+      this.answered = native().call.on_message(this.client, frame.byteLength, nowS);
       if (hasPoses) this.decodeMs += this.precisionNowMs() - startedMs;
     }, frame);
   }
@@ -474,6 +477,15 @@ export class Session {
     this.notifying = false;
     this.wake();
   }
+}
+
+function countFrames(message: ArrayBuffer): number {
+  const view = new DataView(message);
+  let count = 0;
+  for (let at = 0; at + frameHeaderBytes <= message.byteLength; ++count) {
+    at += frameHeaderBytes + view.getUint32(at + 8, true);
+  }
+  return count;
 }
 
 /** Frees the memory of clients that are no longer used. */

@@ -105,7 +105,7 @@ class Stream {
     STRIDEWIRE_CHECK(encoder_.Encode(message, frame).has_value());
     std::vector<std::uint64_t> aligned((frame.size() + 7) / 8);
     std::memcpy(aligned.data(), frame.data(), frame.size());
-    session_.OnFrame(std::as_bytes(std::span(aligned)).first(frame.size()), now_s_);
+    session_.OnMessage(std::as_bytes(std::span(aligned)).first(frame.size()), now_s_);
     while (const auto task = session_.TakeLibraryTask()) {
       session_.OnLibraryTask(task->hash, RunLibraryTask(*task));
     }

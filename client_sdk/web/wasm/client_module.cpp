@@ -1,8 +1,8 @@
 // The functions of the WebAssembly module, which the web client calls. src/native.ts declares them.
 //
-// Received messages are passed as frames (protocol/STANDARD.md): the web client passes a frame to
-// `on_frame`, which verifies it, and then reads the fields from the frame. For a message that the
-// web client has made, it passes the type and the payload.
+// WebSocket messages consist of frames (protocol/STANDARD.md): the web client passes a received
+// message to `on_message`, which verifies it, and then reads the fields from the frame. For a
+// message that the web client has made, it passes the type and the payload.
 //
 // Numbers that a function returns besides its result are in `results`; the comment of each function
 // lists them after "results:", each with its index. A text has results[kTextBytes] bytes and begins
@@ -351,9 +351,9 @@ STRIDEWIRE_EXPORT(start_connecting) void StartConnecting(Client* client, double 
 STRIDEWIRE_EXPORT(on_connected) void OnConnected(Client* client, double now_s) {
   client->session.OnConnected(now_s);
 }
-/// Handles the frame in `input`. Returns the command that the frame answers, or 0.
-STRIDEWIRE_EXPORT(on_frame) double OnFrame(Client* client, std::size_t bytes, double now_s) {
-  client->session.OnFrame(Input(bytes), now_s);
+/// Handles the WebSocket message in `input`. Returns the command that it answers, or 0.
+STRIDEWIRE_EXPORT(on_message) double OnMessage(Client* client, std::size_t bytes, double now_s) {
+  client->session.OnMessage(Input(bytes), now_s);
   RunLibraryTasks(*client);
   return static_cast<double>(client->session.answered_command());
 }

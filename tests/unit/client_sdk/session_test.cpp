@@ -1043,12 +1043,11 @@ TEST_F(SessionTest, InvalidServerMessagesCloseTheConnection) {
   EXPECT_EQ(session_->state(), State::kReady);
 }
 
-// Transports that keep frames apart, such as WebSocket, pass exactly one frame at a time.
-TEST_F(SessionTest, FramesMustBeComplete) {
+TEST_F(SessionTest, MessagesContainWholeFrames) {
   std::vector<std::byte> pong;
   ASSERT_TRUE(encoder_.Encode(protocol::Pong{1, 0.5, 1.0, 3}, pong));
   (void)Joined();
-  session_->OnFrame(pong, now_s_);
+  session_->OnMessage(pong, now_s_);
   EXPECT_EQ(session_->state(), State::kReady);
   std::vector<std::byte> two = pong;
   two.insert(two.end(), pong.begin(), pong.end());
@@ -1056,9 +1055,36 @@ TEST_F(SessionTest, FramesMustBeComplete) {
                             std::vector<std::byte>(8), std::vector<std::byte>()}) {
     Use({});
     (void)Joined();
-    session_->OnFrame(bytes, now_s_);
+    session_->OnMessage(bytes, now_s_);
     EXPECT_EQ(session_->state(), State::kWaiting) << bytes.size();
     EXPECT_EQ(session_->last_status(), STRIDEWIRE_PROTOCOL_ERROR);
+  }
+}
+
+TEST_F(SessionTest, AMessageMayContainSeveralBatches) {
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->Observe(Joined(), {}, subscription, command_), STRIDEWIRE_OK);
+  std::vector<std::byte> message = test_world::PoseFrame(5, 1, {{1}});
+  const auto second = test_world::PoseFrame(5, 2, {{1}});
+  message.insert(message.end(), second.begin(), second.end());
+  session_->OnMessage(message, now_s_);
+  EXPECT_EQ(session_->state(), State::kReady);
+  EXPECT_EQ(session_->Statistics().batches_received, 2u);
+
+  std::vector<std::byte> pong;
+  ASSERT_TRUE(encoder_.Encode(protocol::Pong{1, 0.5, 1.0, 3}, pong));
+  std::vector<std::byte> mixed = test_world::PoseFrame(5, 3, {{1}});
+  mixed.insert(mixed.end(), pong.begin(), pong.end());
+  std::vector<std::byte> cut = message;
+  cut.resize(cut.size() - 8);
+  for (const auto& [bytes, why] :
+       {std::pair(mixed, "of which one is neither PoseBatch nor Movements"),
+        std::pair(cut, "ends within a frame")}) {
+    Use({});
+    (void)Joined();
+    session_->OnMessage(bytes, now_s_);
+    EXPECT_EQ(session_->state(), State::kWaiting);
+    EXPECT_THAT(std::string(session_->last_text()), testing::HasSubstr(why));
   }
 }
 

@@ -43,7 +43,7 @@ export class Harness {
 
   /** Passes frames from the server to the session. */
   receive(...frames: ArrayBuffer[]): void {
-    for (const frame of frames) this.session.onFrame(frame, this.nowS);
+    for (const frame of frames) this.session.onFrames(frame, this.nowS);
   }
 
   /** Breaks the connection. */
