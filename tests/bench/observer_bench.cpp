@@ -128,7 +128,8 @@ class NoTransport final : public server::Transport {
   asio::any_io_executor executor() override { return context_.get_executor(); }
   void Prepare(server::Traffic& /*traffic*/, std::size_t /*bytes*/) override {}
   void Receive(std::shared_ptr<User> /*user*/, std::span<std::byte> /*buffer*/) override {}
-  bool Send(std::shared_ptr<User> /*user*/, std::span<const SharedFrame> /*frames*/) override {
+  bool Send(std::shared_ptr<User> /*user*/, std::span<const SharedFrame> /*frames*/,
+            std::size_t /*joined_frames*/) override {
     return true;
   }
   void KeepAlive(std::shared_ptr<User> /*user*/) override {}

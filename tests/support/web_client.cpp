@@ -84,33 +84,45 @@ void WebClient::BeginRead() {
 }
 
 std::optional<protocol::Message> WebClient::Receive(std::chrono::milliseconds patience) {
-  if (is_closed()) return std::nullopt;
+  if (unread_.empty() && !ReceiveMessage(patience)) return std::nullopt;
+  protocol::FrameReader reader(protocol::Sender::kServer);
+  const std::span<const std::byte> before = unread_;
+  const auto next = reader.Next(unread_);
+  if (!next || !next->has_value()) {
+    std::fprintf(stderr, "the server sent a message that ends within a frame\n");
+    std::abort();
+  }
+  const auto frame = before.first(before.size() - unread_.size());
+  frame_.assign(frame.begin(), frame.end());
+  // The message must refer to frame_, which stays valid until the next call.
+  const protocol::FrameView view{
+      (*next)->type, std::span<const std::byte>(frame_).subspan(protocol::kFrameHeaderBytes)};
+  auto message = protocol::DecodeMessage(view);
+  if (message) return *std::move(message);
+  std::fprintf(stderr, "the server sent no message: %s\n", Describe(message.error()).c_str());
+  std::abort();
+}
+
+bool WebClient::ReceiveMessage(std::chrono::milliseconds patience) {
+  if (is_closed()) return false;
   const auto until = std::chrono::steady_clock::now() + patience;
   BeginRead();
   while (is_reading_ && std::chrono::steady_clock::now() < until) {
     context_.restart();
     context_.run_one_until(until);
   }
-  if (!has_message_) return std::nullopt;
+  if (!has_message_) return false;
   has_message_ = false;
   const auto* data = static_cast<const std::byte*>(buffer_.data().data());
-  frame_.assign(data, data + buffer_.size());
+  message_.assign(data, data + buffer_.size());
   buffer_.consume(buffer_.size());
   if (!stream_.got_binary()) {
     std::fprintf(stderr, "the server sent a text\n");
     std::abort();
   }
-  protocol::FrameReader reader(protocol::Sender::kServer);
-  std::span<const std::byte> rest = frame_;
-  const auto next = reader.Next(rest);
-  if (!next || !next->has_value() || !rest.empty()) {
-    std::fprintf(stderr, "the server sent a message that is not one frame\n");
-    std::abort();
-  }
-  // The message must refer to frame_, which is aligned, because this reader is destroyed.
-  auto message = protocol::DecodeMessage(**next);
-  if (message) return *std::move(message);
-  std::fprintf(stderr, "the server sent no message: %s\n", Describe(message.error()).c_str());
+  unread_ = message_;
+  if (!unread_.empty()) return true;
+  std::fprintf(stderr, "the server sent an empty message\n");
   std::abort();
 }
 

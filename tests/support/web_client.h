@@ -10,8 +10,8 @@
 
 namespace stridewire {
 
-/// RawClient over a WebSocket, with Beast. Each SendBytes sends one binary message; each received
-/// message must contain one frame.
+/// RawClient over a WebSocket, with Beast. Each SendBytes sends one binary message. Received
+/// messages must contain whole frames.
 class WebClient : public RawClient {
  public:
   struct Options {
@@ -52,13 +52,19 @@ class WebClient : public RawClient {
   [[nodiscard]] int pings() const { return pings_; }
   /// Returns the bytes of the last frame.
   [[nodiscard]] std::span<const std::byte> last_frame() const { return frame_; }
+  /// Returns true if the next frame belongs to the same WebSocket message as the last frame.
+  [[nodiscard]] bool is_within_message() const { return !unread_.empty(); }
 
  private:
   void BeginRead();
+  /// Receives a WebSocket message into message_. Returns false if there is none.
+  [[nodiscard]] bool ReceiveMessage(std::chrono::milliseconds patience);
 
   boost::asio::io_context context_;
   boost::beast::websocket::stream<boost::asio::ip::tcp::socket> stream_;
   boost::beast::flat_buffer buffer_;
+  std::vector<std::byte> message_;
+  std::span<const std::byte> unread_;  // The frames of message_ that Receive has not returned yet.
   std::vector<std::byte> frame_;
   bool is_reading_ = false;
   bool has_message_ = false;

@@ -285,6 +285,9 @@ std::vector<ConfigKey> MakeKeys() {
         &Limits::event_replay_bytes, std::size_t{0}, 1024 * kMiB);
   limit("socket_send_buffer_bytes", "SO_SNDBUF of a connection; 0: the default of the system",
         &Limits::socket_send_buffer_bytes, std::size_t{0}, 64 * kMiB);
+  limit("websocket_gather_s",
+        "Seconds for which batches of shards wait to share a WebSocket message; 0: never",
+        &Limits::websocket_gather_s, 0.0, 1.0);
   limit("max_http_connections", "HTTP connections, without /stream", &Limits::max_http_connections,
         1, 65'536);
   return keys;

@@ -59,6 +59,9 @@ struct Limits {
   std::size_t event_replay_bytes = std::size_t{1} << 20;
   /// Value of SO_SNDBUF; 0: the default of the system.
   std::size_t socket_send_buffer_bytes = 0;
+  /// Maximum time for which a batch of one shard waits for those of other shards, so that they are
+  /// sent in one WebSocket message; 0: batches never wait.
+  double websocket_gather_s = 0.004;
 
   int max_http_connections = 64;
 };

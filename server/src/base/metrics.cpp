@@ -163,6 +163,9 @@ std::string Metrics::Text() {
           &ThreadMetrics::batches_composed);
   counter("stridewire_batches_sent_total", "Pose batches written to sockets.",
           &ThreadMetrics::batches_sent);
+  counter("stridewire_websocket_messages_sent_total",
+          "WebSocket messages sent. One message may contain several batches.",
+          &ThreadMetrics::websocket_messages_sent);
   counter("stridewire_batches_dropped_total",
           "Pose batches dropped because an observer was too slow.",
           &ThreadMetrics::batches_dropped);

@@ -66,6 +66,7 @@ struct alignas(128) ThreadMetrics {
   Count poses_sent;
   Count batches_composed;  ///< Batches that were composed for one session or one set of rows.
   Count batches_sent;
+  Count websocket_messages_sent;
   Count batches_dropped;
   Count pose_errors;
   Count events_dropped;

@@ -25,6 +25,7 @@ Connection::Connection(std::unique_ptr<Transport> transport, const Limits& limit
     : transport_(std::move(transport)),
       kind_(transport_->kind()),
       timer_(transport_->executor()),
+      wait_timer_(transport_->executor()),
       limits_(limits),
       metrics_(metrics),
       reader_(protocol::Sender::kClient, {limits.max_control_bytes, limits.max_bulk_bytes}),
@@ -140,6 +141,7 @@ std::unique_ptr<Transport> Connection::Release(std::vector<std::byte>& received)
   handler_ = nullptr;
   is_closed_ = true;
   timer_.cancel();
+  wait_timer_.cancel();
   transport_->Detach();
   return std::move(transport_);
 }
@@ -164,21 +166,26 @@ void Connection::SendTerrain(WorldId world, SharedFrame frame) {
   ScheduleFlush();
 }
 
-std::size_t Connection::SendMovements(WorldId world, int shard, SharedFrame frame) {
+std::size_t Connection::SendMovements(WorldId world, int shard, SharedFrame frame, double wait_s) {
   if (is_closed_ || is_closing_) return 0;
   const std::size_t dropped = queue_.PushMovements(world, shard, std::move(frame));
-  ScheduleFlush();
+  ScheduleFlush(wait_s);
   return dropped;
 }
 
-std::size_t Connection::SendPoses(PoseFrames&& batch) {
+std::size_t Connection::SendPoses(PoseFrames&& batch, double wait_s) {
   if (is_closed_ || is_closing_) return 0;
   const std::size_t dropped = queue_.PushPoses(std::move(batch));
-  ScheduleFlush();
+  ScheduleFlush(wait_s);
   return dropped;
 }
 
-void Connection::ScheduleFlush() {
+void Connection::ScheduleFlush(double wait_s) {
+  if (wait_s > 0.0 && kind_ == TransportKind::kWebSocket) {
+    if (!is_urgent_) Wait(wait_s);
+    return;
+  }
+  is_urgent_ = true;
   // Flush is posted, so that all frames of a tick are sent in one write.
   if (is_writing_ || is_flush_scheduled_) return;
   is_flush_scheduled_ = true;
@@ -188,18 +195,41 @@ void Connection::ScheduleFlush() {
   });
 }
 
+// If frames wait already, the earlier of both times applies.
+void Connection::Wait(double wait_s) {
+  const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                        std::chrono::duration<double>(wait_s));
+  if (is_waiting_ && wait_until_ <= until) return;
+  is_waiting_ = true;
+  wait_until_ = until;
+  wait_timer_.expires_at(until);
+  wait_timer_.async_wait([weak = weak_from_this()](const error_code& error) {
+    const auto self = weak.lock();
+    if (error || self == nullptr || !self->is_waiting_) return;
+    self->is_waiting_ = false;
+    self->Flush();
+  });
+}
+
 void Connection::Flush() {
-  while (!is_writing_ && !is_closed_ && !is_lingering_) {
+  while (!is_writing_ && !is_closed_ && !is_lingering_ && (is_urgent_ || !is_waiting_)) {
     queue_.Gather(kWriteBytes, in_flight_);
+    is_waiting_ = false;
+    is_urgent_ = !queue_.empty();
     if (in_flight_.frames.empty()) {
       if (is_closing_) BeginLinger();
       return;
     }
     metrics_.poses_sent.Add(in_flight_.poses);
     metrics_.batches_sent.Add(in_flight_.batches);
+    if (kind_ == TransportKind::kWebSocket) {
+      const std::size_t joined = in_flight_.stream_frames;
+      metrics_.websocket_messages_sent.Add(in_flight_.frames.size() - joined +
+                                           (joined > 0 ? 1 : 0));
+    }
     traffic_.BeginToSend();
     is_writing_ = true;
-    if (!transport_->Send(shared_from_this(), in_flight_.frames)) return;
+    if (!transport_->Send(shared_from_this(), in_flight_.frames, in_flight_.stream_frames)) return;
     is_writing_ = false;
     Sent();
   }
@@ -267,6 +297,7 @@ void Connection::CloseGently(CloseCode code) {
   handler_ = nullptr;
   closing_since_ = Clock::now();
   queue_.DropAllPoses();
+  is_urgent_ = true;
   // Reading continues until the peer closes. The received bytes are discarded.
   if (!is_processing_)
     Read();
@@ -287,6 +318,7 @@ void Connection::Close() {
   const auto self = shared_from_this();
   is_closed_ = true;
   timer_.cancel();
+  wait_timer_.cancel();
   transport_->Close();
   if (handler_ != nullptr) std::exchange(handler_, nullptr)->OnClosed();
 }

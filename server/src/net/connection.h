@@ -57,10 +57,17 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   void SendControl(SharedFrame frame);
   [[nodiscard]] bool SendEvents(SharedFrame frame);
   /// Sends a batch. Returns how many waiting frames of older batches were dropped because the peer
-  /// is slow.
-  [[nodiscard]] std::size_t SendPoses(PoseFrames&& batch);
-  /// Sends movements. The result is that of SendQueue::PushMovements.
-  [[nodiscard]] std::size_t SendMovements(WorldId world, int shard, SharedFrame frame);
+  /// is slow. Over a WebSocket, the batch may wait for `wait_s` seconds, so that several batches
+  /// leave in one message. Control messages do not wait. When one is sent, waiting batches leave in
+  /// the same write.
+  [[nodiscard]] std::size_t SendPoses(PoseFrames&& batch, double wait_s);
+  /// Sends movements. The result is that of SendQueue::PushMovements. For `wait_s`, see SendPoses.
+  [[nodiscard]] std::size_t SendMovements(WorldId world, int shard, SharedFrame frame,
+                                          double wait_s);
+  /// Sends batches that wait.
+  void EndWait() {
+    if (is_waiting_) ScheduleFlush();
+  }
   void DropMovements(WorldId world) { queue_.DropMovements(world); }
   void SendTerrain(WorldId world, SharedFrame frame);
   void DropTerrain(WorldId world) { queue_.DropTerrain(world); }
@@ -97,7 +104,8 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   [[nodiscard]] Expected<std::optional<protocol::FrameView>> NextFrameOfMessages();
   void Refuse(const Error& error);
   void Read();
-  void ScheduleFlush();
+  void ScheduleFlush(double wait_s = 0.0);
+  void Wait(double wait_s);
   void Flush();
   void Sent();
   void Watch();
@@ -106,6 +114,7 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   std::unique_ptr<Transport> transport_;  // Null after Release.
   const TransportKind kind_;
   boost::asio::steady_timer timer_;
+  boost::asio::steady_timer wait_timer_;
   const Limits limits_;
   ThreadMetrics& metrics_;
   ConnectionHandler* handler_ = nullptr;
@@ -126,6 +135,9 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   SendQueue::Gathered in_flight_;
   bool is_writing_ = false;
   bool is_flush_scheduled_ = false;
+  bool is_urgent_ = false;   // True if a frame in the queue must not wait.
+  bool is_waiting_ = false;  // True if frames in the queue wait until wait_until_.
+  Clock::time_point wait_until_;
   bool is_closing_ = false;
   bool is_lingering_ = false;
   bool is_closed_ = false;

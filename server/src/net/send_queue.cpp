@@ -21,6 +21,7 @@ SendQueue::SendQueue(std::size_t control_budget_bytes, int backlog_ticks)
 
 void SendQueue::Gathered::clear() {
   frames.clear();
+  stream_frames = 0;
   bytes = 0;
   poses = 0;
   batches = 0;
@@ -114,6 +115,7 @@ void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
     out.frames.push_back(std::move(terrains_.begin()->second));
     terrains_.erase(terrains_.begin());
   }
+  const std::size_t other_frames = out.frames.size();
   std::size_t taken_bytes = 0;
   for (std::size_t i = 0; !movements_.empty() && taken_bytes < max_bytes && i < kMaxGatheredFrames;
        ++i) {
@@ -146,6 +148,7 @@ void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
     ++lane;
   }
   out.bytes += pose_bytes;
+  out.stream_frames = out.frames.size() - other_frames;
   STRIDEWIRE_CHECK(!control_.empty() || control_bytes_ == 0);
   STRIDEWIRE_CHECK(!movements_.empty() || movement_bytes_ == 0);
 }

@@ -11,18 +11,6 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-// A buffer sequence that borrows its buffers. Asio copies buffer sequences, and copying a vector
-// would allocate memory for every write.
-struct BufferList {
-  // These names are required by Asio.
-  using value_type = asio::const_buffer;             // NOLINT(readability-identifier-naming)
-  using const_iterator = const asio::const_buffer*;  // NOLINT(readability-identifier-naming)
-  const_iterator first;
-  const_iterator last;
-  [[nodiscard]] const_iterator begin() const { return first; }
-  [[nodiscard]] const_iterator end() const { return last; }
-};
-
 class TcpTransport final : public Transport {
  public:
   explicit TcpTransport(PortableSocket::Socket socket) : socket_(std::move(socket)) {}
@@ -42,7 +30,8 @@ class TcpTransport final : public Transport {
         });
   }
 
-  bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
+  bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames,
+            std::size_t /*joined_frames*/) override {
     buffers_.clear();
     for (const SharedFrame& frame : frames) buffers_.emplace_back(frame->data(), frame->size());
     first_buffer_ = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <chrono>
@@ -27,6 +28,18 @@ enum class CloseCode : std::uint16_t {
   kPolicy = 1008,
   kTooBig = 1009,
   kTryAgainLater = 1013,
+};
+
+/// A buffer sequence that borrows its buffers. Asio copies buffer sequences, and copying a vector
+/// would allocate memory for every write.
+struct BufferList {
+  // These names are required by Asio.
+  using value_type = boost::asio::const_buffer;             // NOLINT(readability-identifier-naming)
+  using const_iterator = const boost::asio::const_buffer*;  // NOLINT(readability-identifier-naming)
+  const_iterator first;
+  const_iterator last;
+  [[nodiscard]] const_iterator begin() const { return first; }
+  [[nodiscard]] const_iterator end() const { return last; }
 };
 
 /// Counts the bytes of one connection and records when the last bytes were received and sent.
@@ -57,8 +70,8 @@ class Traffic {
   Clock::time_point last_sent_ = last_received_;
 };
 
-/// Carries the frames of one connection: one after the other over plain TCP, or each as a binary
-/// message of a WebSocket. A transport owns one socket and is used by one thread at a time. At most
+/// Carries the frames of one connection: one after the other over plain TCP, or in binary messages
+/// of a WebSocket. A transport owns one socket and is used by one thread at a time. At most
 /// one Receive and one Send may be pending. There is one virtual call per read or write, not per
 /// frame.
 class Transport {
@@ -84,7 +97,8 @@ class Transport {
   virtual ~Transport() = default;
 
   [[nodiscard]] virtual TransportKind kind() const = 0;
-  /// True if the transport has message boundaries. Each message must then contain one frame.
+  /// True if the transport has message boundaries. Each received message must then contain one
+  /// frame.
   [[nodiscard]] bool has_messages() const { return kind() == TransportKind::kWebSocket; }
   [[nodiscard]] virtual boost::asio::any_io_executor executor() = 0;
 
@@ -94,10 +108,10 @@ class Transport {
 
   /// Receives some bytes into `buffer`, which the user owns. Calls OnReceived later.
   virtual void Receive(std::shared_ptr<User> user, std::span<std::byte> buffer) = 0;
-  /// Sends all `frames`, which the user keeps alive. Returns true if they were sent at once;
-  /// otherwise calls OnSent later.
-  [[nodiscard]] virtual bool Send(std::shared_ptr<User> user,
-                                  std::span<const SharedFrame> frames) = 0;
+  /// Sends all `frames`, which the user keeps alive. The last `joined_frames` of them may share a
+  /// message. Returns true if they were sent at once; otherwise calls OnSent later.
+  [[nodiscard]] virtual bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames,
+                                  std::size_t joined_frames) = 0;
 
   /// Sends a ping, if the transport has pings. The WebSocket implementation of the peer answers it,
   /// not its application. The answer counts as received bytes.

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "net/portable_socket.h"
 #include "stridewire/base/version.h"
@@ -73,8 +74,10 @@ class WebSocketTransport final : public Transport {
             }));
   }
 
-  bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
+  bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames,
+            std::size_t joined_frames) override {
     unsent_ = frames;
+    joined_frames_ = joined_frames;
     Write(std::move(user));
     return false;
   }
@@ -112,10 +115,14 @@ class WebSocketTransport final : public Transport {
 
  private:
   void Write(std::shared_ptr<User> user) {
-    const SharedFrame& frame = unsent_.front();
-    unsent_ = unsent_.subspan(1);
+    const std::size_t count = unsent_.size() <= joined_frames_ ? unsent_.size() : 1;
+    buffers_.clear();
+    for (const SharedFrame& frame : unsent_.first(count)) {
+      buffers_.emplace_back(frame->data(), frame->size());
+    }
+    unsent_ = unsent_.subspan(count);
     stream_.async_write(
-        asio::buffer(frame->data(), frame->size()),
+        BufferList{buffers_.data(), buffers_.data() + buffers_.size()},
         [this, user = std::move(user)](const error_code& error, std::size_t) mutable {
           if (error || unsent_.empty()) {
             user->OnSent(error);
@@ -133,6 +140,8 @@ class WebSocketTransport final : public Transport {
   websocket::stream<PortableSocket> stream_;
   std::optional<UpgradeRequest> request_;  // Set until the request has been answered.
   std::span<const SharedFrame> unsent_;
+  std::size_t joined_frames_ = 0;            // The last frames of unsent_, sent as one message.
+  std::vector<asio::const_buffer> buffers_;  // The frames of the message that is being sent.
   bool is_pinging_ = false;
 };
 

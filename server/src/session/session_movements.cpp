@@ -15,6 +15,9 @@ namespace {
 // Approximate size of the states that a shard sends per request.
 constexpr std::size_t kStatesBytes = 100'000;
 
+// Maximum time for which movements wait for a tick that the client evaluates.
+constexpr double kMaxWaitS = 0.1;
+
 }  // namespace
 
 const std::vector<SharedFrame>& SharedMovements::frames() {
@@ -79,9 +82,9 @@ void SessionStream::RequestStates() {
 }
 
 void SessionStream::SendMovements(WorldId world, int shard, MovementFeed& feed,
-                                  const SharedFrame& frame) {
+                                  const SharedFrame& frame, double wait_s) {
   if (context_.connection == nullptr || feed.is_lost() || frame == nullptr) return;
-  const std::size_t dropped = context_.connection->SendMovements(world, shard, frame);
+  const std::size_t dropped = context_.connection->SendMovements(world, shard, frame, wait_s);
   if (dropped == 0) return;
   feed.SetLost();
   CountDroppedBatches(world, dropped);
@@ -92,17 +95,24 @@ void SessionStream::OnMovements(SharedMovements& movements) {
   const auto it = movement_feeds_.find({delivery.world, delivery.from_shard});
   if (it == movement_feeds_.end()) return;
   MovementFeed& feed = it->second;
+  const SendInterval interval = IntervalOf(delivery.world, PoseMode::kMovement);
+  const std::uint64_t every_n_ticks = std::max(interval.all, interval.subset);
+  const bool is_due = every_n_ticks == 0 || delivery.tick % every_n_ticks == 0;
+  const bool waits = context_.host.config().limits.websocket_gather_s > 0.0;
+  const double wait_s = is_due || !waits ? GatherTime() : kMaxWaitS;
   for (std::size_t i = 0; i < delivery.steps->size() && !feed.is_lost(); ++i) {
     if (feed.covers_all()) {
-      SendMovements(delivery.world, delivery.from_shard, feed, movements.frames()[i]);
+      SendMovements(delivery.world, delivery.from_shard, feed, movements.frames()[i], wait_s);
       continue;
     }
     const protocol::Movements selected =
         feed.Select((*delivery.steps)[i], context_.host.config().limits.max_bulk_bytes);
     SendMovements(delivery.world, delivery.from_shard, feed,
                   selected.avatars.empty() ? movements.EmptyFrame(i, selected)
-                                           : EncodeFrame(context_.host.encoder(), selected));
+                                           : EncodeFrame(context_.host.encoder(), selected),
+                  wait_s);
   }
+  if (is_due) OnGathered(delivery.tick, delivery.from_shard);
   RegionMembers* region = subscriptions_.FindRegion(delivery.world, PoseMode::kMovement);
   // The grid is null until the shard has received the region.
   if (region != nullptr && delivery.grid != nullptr) {
@@ -120,7 +130,7 @@ void SessionStream::OnStates(const StatesResult& result) {
   const auto it = movement_feeds_.find({result.world, result.from_shard});
   if (it == movement_feeds_.end() || !it->second.OnStates(result)) return;
   if (result.frame != nullptr) {
-    SendMovements(result.world, result.from_shard, it->second, result.frame);
+    SendMovements(result.world, result.from_shard, it->second, result.frame, GatherTime());
   }
   RequestStates();
 }

@@ -159,7 +159,26 @@ void SessionStream::SendPoses(const PoseDelivery& delivery, std::vector<SharedFr
                                                       .mode = delivery.mode,
                                                       .shard = delivery.from_shard,
                                                       .avatar_count = delivery.avatar_count,
-                                                      .frames = std::move(frames)}));
+                                                      .frames = std::move(frames)},
+                                                     GatherTime()));
+  OnGathered(delivery.tick, delivery.from_shard);
+}
+
+double SessionStream::GatherTime() const {
+  if (context_.host.shard_count() == 1) return 0.0;
+  // No batch waits until the next tick.
+  return std::min(context_.host.config().limits.websocket_gather_s,
+                  0.5 / context_.host.config().tick_hz);
+}
+
+void SessionStream::OnGathered(std::uint64_t tick, int shard) {
+  if (context_.connection == nullptr || tick < gathered_tick_) return;
+  if (tick > gathered_tick_ || gathered_.empty()) {
+    gathered_tick_ = tick;
+    gathered_.assign(static_cast<std::size_t>(context_.host.shard_count()), false);
+  }
+  gathered_[static_cast<std::size_t>(shard)] = true;
+  if (std::ranges::find(gathered_, false) == gathered_.end()) context_.connection->EndWait();
 }
 
 void SessionStream::CountDroppedBatches(WorldId world, std::uint64_t batches) {

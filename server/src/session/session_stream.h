@@ -112,9 +112,15 @@ class SessionStream {
 
  private:
   void EndMovementFeeds(WorldId world);
-  void SendMovements(WorldId world, int shard, MovementFeed& feed, const SharedFrame& frame);
+  void SendMovements(WorldId world, int shard, MovementFeed& feed, const SharedFrame& frame,
+                     double wait_s);
   /// Sends `frames`, which contain poses of `delivery`.
   void SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames);
+  /// Returns how long batches of a tick may wait for those of other shards.
+  [[nodiscard]] double GatherTime() const;
+  /// Must be called after a batch of a shard was sent. Sends all batches of the tick when those of
+  /// all shards are there.
+  void OnGathered(std::uint64_t tick, int shard);
   void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
   /// Numbers and sends a message. While the client is not connected, stores it instead. Returns how
   /// many events were dropped.
@@ -127,6 +133,8 @@ class SessionStream {
   // Feeds by world and by the avatars' shard.
   std::map<std::pair<WorldId, int>, MovementFeed> movement_feeds_;
   std::uint32_t states_nonce_ = 0;
+  std::uint64_t gathered_tick_ = 0;  // Newest tick for which batches were sent.
+  std::vector<bool> gathered_;       // [shard]: whether it has sent a batch of this tick.
   EventReplay event_replay_;
   std::uint64_t events_number_ = 0;  // Number of the last Events message.
 };

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <random>
@@ -170,6 +171,32 @@ TEST(ServerStream, SendsTheSamePosesAsTcp) {
     }
     EXPECT_GE(same, 40u);
   }
+}
+
+TEST(ServerStream, SendsSeveralMovementsPerMessage) {
+  TestServer server(TestConfig(2));
+  RawClient controller = server.Connect();
+  ASSERT_TRUE(controller.SayHello());
+  const auto world = controller.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(controller.Spawn(world->world, {{.avatar = 1}, {.avatar = 2}, {.avatar = 3}}));
+  WebClient web(server.http_port());
+  ASSERT_TRUE(web.SayHello());
+  ASSERT_TRUE(web.Join("w", protocol::Role::kObserver));
+  ASSERT_TRUE(web.Observe(world->world, 1, PoseMode::kMovement, false, 2));
+  std::map<std::uint16_t, std::uint64_t> last_steps;
+  int joined = 0;
+  for (int i = 0; i < 200; ++i) {
+    const auto movements = web.Await<protocol::Movements>();
+    ASSERT_TRUE(movements);
+    joined += web.is_within_message() ? 1 : 0;
+    if (movements->states) continue;
+    const auto [last, is_new] = last_steps.try_emplace(movements->shard, movements->step - 1);
+    EXPECT_EQ(movements->step, last->second + 1);
+    last->second = movements->step;
+  }
+  EXPECT_EQ(last_steps.size(), 2u);
+  EXPECT_GT(joined, 0);
 }
 
 TEST(ServerStream, DoesNotCompress) {

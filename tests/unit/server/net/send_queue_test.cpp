@@ -45,6 +45,7 @@ TEST(SendQueue, SendsControlInOrderAndBeforePoses) {
   SendQueue::Gathered out;
   queue.Gather(1 << 20, out);
   EXPECT_THAT(Marks(out), ElementsAre(1, 2, 50));
+  EXPECT_EQ(out.stream_frames, 1u);
   EXPECT_EQ(out.bytes, 120u);
   EXPECT_EQ(out.poses, 5u);
   EXPECT_EQ(out.batches, 1u);

@@ -2,7 +2,10 @@
 
 #include <array>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/read.hpp>
 #include <boost/asio/write.hpp>
+#include <chrono>
+#include <string>
 
 #include "net/connection.h"
 #include "net/websocket_transport.h"
@@ -50,6 +53,102 @@ class ClosingHandler : public ConnectionHandler {
  private:
   Connection& connection_;
 };
+
+// A connection over WebSocket, and its peer.
+class WebSocketBatches : public testing::Test {
+ protected:
+  void SetUp() override {
+    tcp::acceptor acceptor(context_, {asio::ip::address_v4::loopback(), 0});
+    peer_.connect(acceptor.local_endpoint());
+    connection_ = std::make_shared<Connection>(MakeWebSocketTransport(acceptor.accept(), Upgrade()),
+                                               Limits{}, metrics_);
+    connection_->Start(&handler_);
+    std::string answer;
+    Run([&] { return answer.ends_with("\r\n\r\n"); }, [&] { answer += Read(1); });
+  }
+  void TearDown() override {
+    connection_->Close();
+    context_.restart();
+    context_.run_for(std::chrono::seconds(20));
+  }
+
+  // Runs the connection and `step` until `is_done`.
+  template <typename IsDone, typename Step>
+  void Run(const IsDone& is_done, const Step& step) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!is_done() && std::chrono::steady_clock::now() < end) {
+      context_.restart();
+      context_.run_one_for(std::chrono::milliseconds(1));
+      step();
+    }
+    ASSERT_TRUE(is_done());
+  }
+  std::string Read(std::size_t bytes) {
+    if (peer_.available() < bytes) return {};
+    std::string read(bytes, 0);
+    asio::read(peer_, asio::buffer(read));
+    return read;
+  }
+  // Returns the payload of the next message, which must have less than 126 bytes.
+  std::string ReadMessage() {
+    std::string header;
+    Run([&] { return !header.empty(); }, [&] { header = Read(2); });
+    std::string payload;
+    Run([&] { return !payload.empty(); },
+        [&] { payload = Read(static_cast<std::size_t>(header[1])); });
+    return payload;
+  }
+  static SharedFrame Frame(char mark) {
+    return std::make_shared<const std::vector<std::byte>>(16, static_cast<std::byte>(mark));
+  }
+  void Move(int shard, char mark, double wait_s) {
+    EXPECT_EQ(connection_->SendMovements(1, shard, Frame(mark), wait_s), 0u);
+  }
+  static std::string Text(char mark) { return std::string(16, mark); }
+
+  static constexpr double kForeverS = 3600.0;
+  asio::io_context context_;
+  tcp::socket peer_{context_};
+  ThreadMetrics metrics_;
+  std::shared_ptr<Connection> connection_;
+  struct : ConnectionHandler {
+    void OnMessage(protocol::Message&&) override {}
+    void OnBadFrame(const Error&) override {}
+    void OnClosed() override {}
+  } handler_;
+};
+
+TEST_F(WebSocketBatches, LeaveTogetherWhenTheWaitEnds) {
+  Move(0, 'a', kForeverS);
+  Move(1, 'b', kForeverS);
+  context_.restart();
+  context_.run_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(peer_.available(), 0u);
+  connection_->EndWait();
+  EXPECT_EQ(ReadMessage(), Text('a') + Text('b'));
+  connection_->EndWait();  // Nothing waits.
+  Move(0, 'c', kForeverS);
+  Move(1, 'd', 0.001);  // The earlier end applies.
+  Move(0, 'e', kForeverS);
+  EXPECT_EQ(ReadMessage(), Text('c') + Text('d') + Text('e'));
+  EXPECT_EQ(metrics_.websocket_messages_sent.value(), 2u);
+}
+
+TEST_F(WebSocketBatches, LeaveWithControlMessages) {
+  Move(0, 'a', kForeverS);
+  connection_->SendControl(Frame('x'));
+  connection_->SendControl(Frame('y'));
+  Move(1, 'b', kForeverS);
+  EXPECT_EQ(ReadMessage(), Text('x'));
+  EXPECT_EQ(ReadMessage(), Text('y'));
+  EXPECT_EQ(ReadMessage(), Text('a') + Text('b'));
+}
+
+TEST_F(WebSocketBatches, LeaveBeforeTheConnectionCloses) {
+  Move(0, 'a', kForeverS);
+  connection_->CloseGently();
+  EXPECT_EQ(ReadMessage(), Text('a'));
+}
 
 // Beast then suspends the read and the close at the same time.
 TEST(WebSocketConnection, EndsIfAnInvalidFrameArrivesWhileClosing) {
