@@ -169,7 +169,7 @@ void WholePose(benchmark::State& state, const Library& library) {
     cache.FinishStep();
     Status status = rows.Begin(info, avatars, codecs.Find(kMode));
     for (std::size_t i = 0; i < slots.size(); ++i) {
-      const server::EncodedPoseCache::Encoded encoded = cache.Find(slots[i], kMode);
+      const server::EncodedPoseCache::Encoded encoded = cache.Find(slots[i].number(), kMode);
       rows.AddEncoded(0, encoded.is_uncompressed, encoded.bytes);
     }
     std::span<const std::uint32_t> left = all;

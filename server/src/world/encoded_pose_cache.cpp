@@ -269,9 +269,9 @@ void EncodedPoseCache::EncodeOverflow(ConstPoseSpan pose, std::uint32_t slot,
       static_cast<std::uint8_t>(1u << (is_encoded ? mode : mode + kMaxModes));
 }
 
-EncodedPoseCache::Encoded EncodedPoseCache::Find(const Slot& slot, PoseMode mode) const {
-  STRIDEWIRE_CHECK(slot.cache_ == this);
-  const SlotState& state = slots_[slot.index_];
+EncodedPoseCache::Encoded EncodedPoseCache::Find(std::uint32_t slot, PoseMode mode) const {
+  STRIDEWIRE_CHECK(slot < slots_.size());
+  const SlotState& state = slots_[slot];
   const std::size_t pose = PoseIndex(state);
   std::size_t m = 0;
   while (m < modes_.size() && modes_[m].mode != mode) ++m;
@@ -279,11 +279,11 @@ EncodedPoseCache::Encoded EncodedPoseCache::Find(const Slot& slot, PoseMode mode
   // Slots are read in order, but the hardware prefetcher stops at the end of each page, so poses
   // are prefetched this many slots ahead.
   constexpr std::size_t kSlotsAhead = 8;
-  if (const std::size_t next = slot.index_ + kSlotsAhead; next < slots_.size()) {
+  if (const std::size_t next = slot + kSlotsAhead; next < slots_.size()) {
     PrefetchBytes(BytesIn(plane_, next) + modes_[m].offset, modes_[m].codec->pose_bytes());
   }
-  if (state.has_overflow) return FindOverflow(slot.index_, pose, m);
-  return {{BytesOf(slot.index_, pose) + modes_[m].offset, modes_[m].codec->pose_bytes()}};
+  if (state.has_overflow) return FindOverflow(slot, pose, m);
+  return {{BytesOf(slot, pose) + modes_[m].offset, modes_[m].codec->pose_bytes()}};
 }
 
 EncodedPoseCache::Encoded EncodedPoseCache::FindOverflow(std::uint32_t slot, std::size_t pose,
@@ -306,12 +306,12 @@ EncodedPoseCache::Encoded EncodedPoseCache::FindOverflow(std::uint32_t slot, std
           true};
 }
 
-Vec3 EncodedPoseCache::FindRoot(const Slot& slot) const {
-  STRIDEWIRE_CHECK(slot.cache_ == this);
-  const SlotState& state = slots_[slot.index_];
+Vec3 EncodedPoseCache::FindRoot(std::uint32_t slot) const {
+  STRIDEWIRE_CHECK(slot < slots_.size());
+  const SlotState& state = slots_[slot];
   const std::size_t pose = PoseIndex(state);
   STRIDEWIRE_CHECK(pose < state.count);
-  const std::byte* bytes = BytesOf(slot.index_, pose);
+  const std::byte* bytes = BytesOf(slot, pose);
   Vec3 root_m;
   if (modes_.empty()) {
     std::memcpy(&root_m, bytes, kRootBytes);
@@ -319,8 +319,7 @@ Vec3 EncodedPoseCache::FindRoot(const Slot& slot) const {
   }
   // The bytes of every mode begin with the root, even if only the uncompressed format can represent
   // the rotations.
-  const bool is_encoded =
-      !state.has_overflow || (overflow_.at(slot.index_).flags[pose] >> kMaxModes) == 0;
+  const bool is_encoded = !state.has_overflow || (overflow_.at(slot).flags[pose] >> kMaxModes) == 0;
   const std::span<const std::byte, kRootBytes> root(bytes, kRootBytes);
   if (!is_encoded || !protocol::DecodeRoot(root, root_m)) root_m = Vec3(protocol::kMaxRootM);
   return root_m;

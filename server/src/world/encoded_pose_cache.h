@@ -109,6 +109,9 @@ class EncodedPoseCache {
       std::swap(index_, other.index_);
       return *this;
     }
+    /// Returns the number of the slot, with which Find reads its poses. It does not change after the
+    /// first Schedule or Store, before which it is meaningless.
+    [[nodiscard]] std::uint32_t number() const { return index_; }
 
    private:
     friend class EncodedPoseCache;
@@ -160,11 +163,12 @@ class EncodedPoseCache {
     /// True if the pose is in the format of kQuantised (kPoseUncompressed).
     bool is_uncompressed = false;
   };
-  /// Returns the pose of this step, which the slot must contain. `mode` must be one of SetModes.
-  [[nodiscard]] Encoded Find(const Slot& slot, protocol::PoseMode mode) const;
+  /// Returns the pose of this step, which the slot with the number `slot` must contain. `mode` must
+  /// be one of SetModes.
+  [[nodiscard]] Encoded Find(std::uint32_t slot, protocol::PoseMode mode) const;
   /// Returns the root position of this step with the precision of the encoded pose. If the pose
   /// cannot be encoded, returns a position that is out of the range of all others.
-  [[nodiscard]] Vec3 FindRoot(const Slot& slot) const;
+  [[nodiscard]] Vec3 FindRoot(std::uint32_t slot) const;
 
   [[nodiscard]] SoaPoseEvaluator& evaluator() { return scratch_->evaluator; }
   [[nodiscard]] PlanScratch& plan_scratch() { return scratch_->plan; }

@@ -100,7 +100,7 @@ class WorldShard {
     std::uint64_t placed_tick = 0;  // Tick of the spawn or of the last teleport.
     EncodedPoseCache::Slot poses;
   };
-  // Prefetches the members that Encode reads of an avatar without events.
+  // Prefetches the members that CachePoses reads of an avatar without events.
   static void Prefetch(const Entry& entry) {
     entry.avatar.PrefetchTickState();
     PrefetchBytes(&entry.placed_tick, sizeof(entry.placed_tick) + sizeof(entry.poses));
@@ -136,7 +136,14 @@ class WorldShard {
   std::span<const std::uint32_t> SelectedRows(protocol::PoseMode mode);
   std::span<const std::uint32_t> SelectedAndRegionRows(protocol::PoseMode mode,
                                                        const SpatialGrid& grid);
-  // Encodes the poses of these rows into the cache.
+  // What Encode needs of an avatar whose pose is in the cache. Each avatar is on another page of
+  // memory, so reading avatars a second time per tick would be slow.
+  struct CachedPose {
+    std::uint64_t placed_tick;
+    std::uint32_t slot;
+    bool is_standing;
+  };
+  // Encodes the poses of these rows into the cache, and sets `cached_poses_`.
   void CachePoses(std::span<const std::uint32_t> rows);
   // Evaluates the poses of these rows in their avatars.
   void EvaluatePoses(std::span<const std::uint32_t> rows);
@@ -187,6 +194,7 @@ class WorldShard {
   std::array<std::vector<std::uint32_t>, kSentModes.size()> selected_rows_;  // by mode
   std::array<bool, kSentModes.size()> last_had_poses_{};                     // by mode
   std::array<RowsPool, kSentModes.size()> rows_;                             // by mode
+  std::vector<CachedPose> cached_poses_;  // Of the rows of the last CachePoses, in their order.
   // Positions of the avatars at grid_tick_.
   std::shared_ptr<const SpatialGrid> grid_;
   std::uint64_t grid_tick_ = 0;

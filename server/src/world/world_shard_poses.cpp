@@ -61,12 +61,14 @@ std::span<const std::uint32_t> WorldShard::SelectedAndRegionRows(PoseMode mode,
 void WorldShard::CachePoses(std::span<const std::uint32_t> rows) {
   const std::span<const OrderedAvatar> ordered = OrderedAvatars();
   cache_.BeginStep(step_, clock_.tick_s(), rows.size());
+  cached_poses_.clear();
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + kPrefetchDistance < rows.size()) {
       Prefetch(*ordered[rows[i + kPrefetchDistance]].entry);
     }
     Entry& entry = *ordered[rows[i]].entry;
     cache_.Request(entry.poses, entry.avatar);
+    cached_poses_.push_back({entry.placed_tick, entry.poses.number(), entry.avatar.idle()});
   }
   cache_.FinishStep();
 }
@@ -85,7 +87,7 @@ std::shared_ptr<const SpatialGrid> WorldShard::GridAt(std::uint64_t tick) {
   grid->Begin(world_->interest_cell_m, ordered.size());
   CachePoses(all_rows_);
   for (std::size_t i = 0; i < ordered.size(); ++i) {
-    const Vec3 root_m = cache_.FindRoot(ordered[i].entry->poses);
+    const Vec3 root_m = cache_.FindRoot(cached_poses_[i].slot);
     grid->Add(static_cast<std::uint32_t>(i), root_m.x, root_m.z);
   }
   grid->Sort();
@@ -124,23 +126,25 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool all,
   } else {
     EvaluatePoses(picked);
   }
-  for (std::size_t i = 0; i < picked.size(); ++i) {
-    const Entry& entry = *ordered[picked[i]].entry;
-    if (i + kPrefetchDistance < picked.size()) {
-      Prefetch(*ordered[picked[i + kPrefetchDistance]].entry);
-    }
-    std::uint8_t flags = 0;
+  const auto flags_of = [&](std::uint64_t placed_tick, bool is_standing) {
+    std::uint8_t flags = is_standing ? protocol::kPoseStanding : 0;
     // The flag stays set for the longest interval of any observer, so that every observer receives
     // it.
-    if (tick < entry.placed_tick + interest_.max_interval()) flags |= protocol::kPoseDiscontinuity;
-    if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
+    if (tick < placed_tick + interest_.max_interval()) flags |= protocol::kPoseDiscontinuity;
+    return flags;
+  };
+  for (std::size_t i = 0; i < picked.size(); ++i) {
     rows.SkipTo(picked[i]);
     if (is_compact) {
-      const EncodedPoseCache::Encoded encoded = cache_.Find(entry.poses, mode);
-      rows.AddEncoded(flags, encoded.is_uncompressed, encoded.bytes);
+      const CachedPose& cached = cached_poses_[i];
+      const EncodedPoseCache::Encoded encoded = cache_.Find(cached.slot, mode);
+      rows.AddEncoded(flags_of(cached.placed_tick, cached.is_standing), encoded.is_uncompressed,
+                      encoded.bytes);
     } else {
+      const Entry& entry = *ordered[picked[i]].entry;
       const ConstPoseSpan pose = entry.avatar.pose();
-      (void)rows.Add(flags, pose.root_position_m, pose.rotations);
+      (void)rows.Add(flags_of(entry.placed_tick, entry.avatar.idle()), pose.root_position_m,
+                     pose.rotations);
     }
   }
   rows.SkipTo(ordered.size());

@@ -87,7 +87,7 @@ class CachedCrowd {
     const float max_error_m = modes.empty() ? 0.0f : 0.51f / protocol::kRootStepsPerM;
     for (std::size_t i = 0; i < kCrowd; ++i) {
       const Vec3 error_m =
-          cache_.FindRoot(slots_[i]) - reference_.avatars()[i].pose().root_position_m;
+          cache_.FindRoot(slots_[i].number()) - reference_.avatars()[i].pose().root_position_m;
       ASSERT_LE(std::max({std::abs(error_m.x), std::abs(error_m.y), std::abs(error_m.z)}),
                 max_error_m)
           << "step " << step_ << ", avatar " << i;
@@ -95,7 +95,7 @@ class CachedCrowd {
     for (const PoseMode mode : modes) {
       const protocol::PoseRows& rows = encoder_.Encode(mode, reference_.avatars());
       for (std::size_t i = 0; i < kCrowd; ++i) {
-        const EncodedPoseCache::Encoded encoded = cache_.Find(slots_[i], mode);
+        const EncodedPoseCache::Encoded encoded = cache_.Find(slots_[i].number(), mode);
         ASSERT_TRUE(std::ranges::equal(encoded.bytes, rows.poses(i, i)))
             << "step " << step_ << ", avatar " << i << ", mode " << static_cast<int>(mode);
         ASSERT_EQ(encoded.is_uncompressed, (rows.flags(i) & protocol::kPoseUncompressed) != 0);
@@ -263,11 +263,11 @@ TEST(EncodedPoseCache, ReturnsAFarRootForPosesThatCannotBeEncoded) {
     cache.Store(slots[i++], 1, pose, true);
   }
   cache.FinishStep();
-  EXPECT_EQ(cache.FindRoot(slots[0]), Vec3(protocol::kMaxRootM));
-  EXPECT_EQ(cache.FindRoot(slots[1]), Vec3(protocol::kMaxRootM));
-  EXPECT_EQ(cache.FindRoot(slots[2]).x, 3.0f);
-  EXPECT_TRUE(cache.Find(slots[0], PoseMode::kCompact).bytes.empty());
-  EXPECT_FALSE(cache.Find(slots[2], PoseMode::kCompact).bytes.empty());
+  EXPECT_EQ(cache.FindRoot(slots[0].number()), Vec3(protocol::kMaxRootM));
+  EXPECT_EQ(cache.FindRoot(slots[1].number()), Vec3(protocol::kMaxRootM));
+  EXPECT_EQ(cache.FindRoot(slots[2].number()).x, 3.0f);
+  EXPECT_TRUE(cache.Find(slots[0].number(), PoseMode::kCompact).bytes.empty());
+  EXPECT_FALSE(cache.Find(slots[2].number(), PoseMode::kCompact).bytes.empty());
 }
 
 // An avatar at the beginning of a step of 0.6 m.
@@ -340,7 +340,7 @@ TEST_F(EncodedPoseCacheSlot, ContainsAStoredPoseForOneStepOrForever) {
   Store(1, /*is_constant=*/true);
   cache_.FinishStep();
   EXPECT_EQ(StepsAfter(1, 1), 100u);
-  EXPECT_EQ(cache_.FindRoot(slot_), library_->stand_pose().root_position_m);
+  EXPECT_EQ(cache_.FindRoot(slot_.number()), library_->stand_pose().root_position_m);
   EXPECT_FALSE(cache_.Contains(slot_, 2)) << "another revision";
   Begin(2);
   Schedule(2);
@@ -386,7 +386,7 @@ TEST_F(EncodedPoseCacheSlot, MustNotBeUsedInTheWrongState) {
   EXPECT_DEATH(Begin(1), "scheduled_");
   cache_.FinishStep();
   Begin(50);
-  EXPECT_DEATH((void)cache_.FindRoot(slot_), "pose < state.count");
+  EXPECT_DEATH((void)cache_.FindRoot(slot_.number()), "pose < state.count");
 }
 
 // Returns how many poses are evaluated in `ticks` ticks, if the avatar is interrupted every
