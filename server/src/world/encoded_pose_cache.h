@@ -109,8 +109,8 @@ class EncodedPoseCache {
       std::swap(index_, other.index_);
       return *this;
     }
-    /// Returns the number of the slot, with which Find reads its poses. It does not change after the
-    /// first Schedule or Store, before which it is meaningless.
+    /// Returns the number of the slot, with which Find reads its poses. It is undefined before the
+    /// first Schedule or Store, and does not change afterwards.
     [[nodiscard]] std::uint32_t number() const { return index_; }
 
    private:
