@@ -8,9 +8,9 @@ UNIT = r"_(m_s|m|rad)$"
 
 
 class CApi(Cpp):
-    """The members of `stridewire_movement` have the names of the fields, or those of the message
-    structs. `has_side` states whether `side_m` is used, and `waypoint_count` is the length of
-    `waypoints_m`."""
+    """Each member of `stridewire_movement` has the name of the field in the schema, or of the
+    member of the message struct. `has_side` states whether `side_m` is used, and `waypoint_count`
+    is the length of `waypoints_m`."""
 
     def source(self, f):
         return f"c.{f.get('cpp', f.name)}"
@@ -27,7 +27,7 @@ class CApi(Cpp):
                 if name in f.get("only", "").split()]
 
     def conditions(self, table):
-        """Conditions on the C struct that the checks of the message do not include."""
+        """Conditions that the C struct must meet and that the checks of the message do not test."""
         lines = []
         for f in table.fields:
             used = " || ".join(self.is_type(f))

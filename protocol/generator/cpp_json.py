@@ -41,7 +41,7 @@ class CppJson(Cpp):
         lines = ["json = Json::object();"]
         for f in self.ordered(table):
             condition = self.used_if(f, "m.{}") + self.condition(f)
-            if "borrowed" in f:  # JSON has decoded poses, which include the other borrowed lists.
+            if "borrowed" in f:  # The decoded poses in the JSON contain all borrowed lists.
                 lines += ['json["poses"] = PosesOf(m);'] if f.name == "poses" else []
             elif "variant" in table and f.name == "type":
                 lines.append(f'json["type"] = {self.variant(table)}.index();')

@@ -1,6 +1,6 @@
 """Reads the subset of the FlatBuffers schema language that protocol/schema uses.
 
-Every declaration knows its line, so that errors name file, line and field. The generator checks the
+Every declaration stores its line, so that errors name file, line and field. This module checks the
 attributes itself, because flatc accepts every declared attribute anywhere.
 """
 
@@ -64,7 +64,7 @@ class Table:
     attributes: dict
     line: int
     doc: list
-    all_fields: list = field(default_factory=list)  # Deprecated ones included: the wire layout.
+    all_fields: list = field(default_factory=list)  # Also deprecated fields, which take space.
 
     def __contains__(self, attribute):
         return attribute in self.attributes
@@ -105,7 +105,7 @@ class Schema:
         return [t for t in self.tables.values() if "message" in t]
 
     def number(self, value):
-        """The value of a bound: a number, or the name of a limit."""
+        """The value of a bound, which is a number or the name of a limit."""
         return int(self.limits[value].default) if value in self.limits else float(value)
 
     def documentation(self, f):

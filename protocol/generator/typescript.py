@@ -24,12 +24,14 @@ class TypeScript:
     # ---- names and types
 
     def name_of(self, f):
-        """The name of a field in TypeScript: that of the C++ member, unless that is a path."""
+        """The name of a field in TypeScript. It is the name of the C++ member in camel case. If the
+        member is a path, it is the name of the field."""
         cpp = f.get("cpp", "")
         return f.get("web") or lower_camel(cpp if cpp.isidentifier() else f.name)
 
     def interface_name(self, table):
-        """Messages have the names of the C++ structs, because Error exists in JavaScript."""
+        """The name of an interface. Messages have the names of the C++ structs, because JavaScript
+        already has a class Error."""
         return table.get("cpp", table.name) if "message" in table else table.name
 
     def vector_of(self, f):

@@ -18,7 +18,7 @@ class TypeScriptCodec(TypeScript):
         return self.schema.tables.get(f.type)
 
     def key_and_value(self, table):
-        """The members of a struct that is a property in TypeScript."""
+        """The two members of a struct that becomes a property: the name and the value."""
         return sorted(table.fields, key=lambda f: "keys" not in f)
 
     def is_parameters(self, f):
@@ -208,8 +208,8 @@ class TypeScriptCodec(TypeScript):
             line = f"b.addFieldStruct({slot}, wire.{f.type}.create{f.type}(b, ...{value}), 0);"
         else:
             adder = ADDERS["ubyte" if self.enum_of(f) else f.type]
-            # Values equal to this default are not stored. No number equals NaN, so with NaN as the
-            # default even 0 is stored.
+            # The builder does not store values that equal `initial`. NaN equals no number, so with
+            # NaN every value is stored, even 0.
             initial = "NaN" if f.default == "null" else "0n" if f.type == "ulong" else \
                 self.schema.enums[f.type].values[self.first_value(f)] if self.enum_of(f) else \
                 f.default or 0
@@ -330,7 +330,7 @@ class TypeScriptCodec(TypeScript):
     def json_lines(self, table):
         properties = self.properties(table)
         for f in table.fields:
-            if "borrowed" in f:  # JSON has decoded poses, which include the other borrowed lists.
+            if "borrowed" in f:  # The decoded poses in the JSON contain all borrowed lists.
                 continue
             vector = self.vector_of(f)
             m = f"m.{vector}[{properties[vector].index(f)}]" if vector else f"m.{self.name_of(f)}"

@@ -14,8 +14,8 @@
 namespace stridewire::protocol {
 namespace {
 
-// The squares of the three smaller components sum to at most 3/4, plus the rounding error of 8
-// bits.
+// The squares of the three smaller components sum to at most 3/4. The margin allows for the
+// rounding error of components of 8 bits.
 constexpr float kMaxThreeSquaredCompact = 0.77f;
 // The decoded w can be smaller than the encoded one, because each component is rounded by up to
 // half a step.
@@ -23,7 +23,7 @@ constexpr float kLeastDecodedW = 0.9f;
 
 constexpr std::size_t kRootBytes = 12;
 
-// Reads the bits that WriteWords in compact_kernel.cpp has written.
+// Reads the numbers of a pose that WriteWords (compact_kernel.cpp) has written without gaps.
 class BitReader {
  public:
   explicit BitReader(std::span<const std::byte> words) : words_(words) {}
@@ -181,8 +181,8 @@ Status CheckReducedJoints(std::span<const std::uint16_t> joints,
   for (std::size_t i = 1; i < joints.size(); ++i) {
     if (joints[i] >= parents.size()) return wrong("no such joint", i);
     if (joints[i] <= joints[i - 1]) return wrong("joints are not ascending", i);
-    // Ignores a parent that does not precede its child. Check(WorldInfo) and Make report that
-    // error.
+    // A parent that does not precede its child is not in joints.first(i), so it is reported here as
+    // missing.
     const std::int16_t parent = parents[joints[i]];
     if (parent < 0 ||
         !std::ranges::binary_search(joints.first(i), static_cast<std::uint16_t>(parent))) {

@@ -5,7 +5,7 @@
 #include "stridewire/protocol/pose_codec.h"
 
 #undef HWY_TARGET_INCLUDE
-// NOLINTNEXTLINE(readability-identifier-naming): Highway's
+// NOLINTNEXTLINE(readability-identifier-naming): Highway requires this name.
 #define HWY_TARGET_INCLUDE "compact_kernel.cpp"
 #include "hwy/foreach_target.h"
 // Must follow foreach_target.h, which includes this file once per instruction set.
@@ -101,8 +101,8 @@ HWY_INLINE VI RootSteps(V metres) {
 }
 
 // Computes the numbers of all joints first and concatenates their bits afterwards. A joint needs
-// the error of its parent, which has a long latency. `plan.order` therefore puts joints of equal
-// depth next to each other, so that the processor overlaps their computation.
+// the error of its parent, whose computation has a long latency. `plan.order` therefore puts joints
+// of equal depth next to each other, so that the processor overlaps their computation.
 void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
   const D d;
   const DI di;
@@ -128,7 +128,8 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
       const float* rotation = work.rotations + 4 * j * kBlock + lane;
       Rotation q = {hn::LoadU(d, rotation), hn::LoadU(d, rotation + kBlock),
                     hn::LoadU(d, rotation + 2 * kBlock), hn::LoadU(d, rotation + 3 * kBlock)};
-      // For other joints the comparison of w with least_w also rejects NaN.
+      // Poses with are_unit may contain NaN. Without "smallest three", the comparison of w with
+      // least_w below rejects it, so this check is not needed.
       if (!work.are_unit || joint.smallest_three_bits > 0) {
         const V squared = hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)),
                                   hn::Mul(q.w, q.w));
@@ -147,7 +148,8 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         q.x = hn::Add(p.x, hn::Sub(hn::Add(hn::Mul(ex, p.w), hn::Mul(ey, p.z)), hn::Mul(ez, p.y)));
         q.y = hn::Add(p.y, hn::Sub(hn::Add(hn::Mul(ey, p.w), hn::Mul(ez, p.x)), hn::Mul(ex, p.z)));
         q.z = hn::Add(p.z, hn::Sub(hn::Add(hn::Mul(ez, p.w), hn::Mul(ex, p.y)), hn::Mul(ey, p.x)));
-        // Other joints do not encode w. They need only an approximate w, so it is not changed.
+        // Without "smallest three", w is not encoded. Without a reference as well, the approximate
+        // w of `p` suffices.
         if (joint.smallest_three_bits > 0 || joint.has_reference) {
           q.w = hn::Sub(p.w, Sum3(hn::Mul(ex, p.x), hn::Mul(ey, p.y), hn::Mul(ez, p.z)));
         }
@@ -160,8 +162,8 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         hn::StoreU(e.z, d, error + 2 * kBlock);
       };
       if (joint.smallest_three_bits > 0) {
-        // Encodes with "smallest three" as in quantise_kernel.cpp, but with a variable number of
-        // bits.
+        // Encodes with "smallest three" as quantise_kernel.cpp does, but the number of bits per
+        // component depends on the joint.
         V largest = q.x;
         VI index = hn::Zero(di);
         const auto take = [&](V component, int number) HWY_ATTR {

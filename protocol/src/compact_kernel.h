@@ -17,7 +17,7 @@ inline constexpr std::size_t kJointRows = 4;
 struct CompactPlan {
   std::span<const CompactJoint> joints;
   std::span<const std::uint16_t> order;  // Indices of all joints, each after its parent.
-  std::span<const CompactPart> parts;    // Parts of all words, whose number is a multiple of 4.
+  std::span<const CompactPart> parts;    // Parts of all words; there are 4 n words.
 };
 
 /// A block of CompactCodec::kBlock poses. The arrays are those of CompactCodec::Block.
@@ -35,7 +35,7 @@ struct CompactWork {
 /// Encodes a block. The bytes do not depend on the vector width of the machine.
 void EncodeCompact(const CompactPlan& plan, const CompactWork& work);
 
-/// Copies the words of one pose in groups of four with non-temporal stores. `to` is aligned to 16
+/// Copies `fours` groups of four words of one pose with non-temporal stores. `to` is aligned to 16
 /// bytes.
 void StreamWords(const std::uint32_t* words, std::size_t fours, std::byte* to);
 

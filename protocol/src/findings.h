@@ -35,8 +35,8 @@ struct Bounds {
 };
 
 /// Copies lists and checks values, and stores the first error. `Error::where` is the path without
-/// indices, for example "Spawn.items.heading_rad". `Error::index` is the index of the outermost
-/// list in the path, otherwise the offending value if it is an integer.
+/// indices, for example "Spawn.items.heading_rad". `Error::index` is the index in the outermost
+/// list of the path. If the path contains no list, it is the offending value if that is an integer.
 class Findings {
  public:
   [[gnu::cold]] void Wrong(ErrorCode code, const char* text, const FieldPath& at,
@@ -44,7 +44,7 @@ class Findings {
 
   [[nodiscard]] bool ok() const { return !error_; }
 
-  /// Checks a value or a rule between fields.
+  /// Stores an error unless `holds`, the result of a check of a value or of a rule between fields.
   template <std::integral Value = int>
   void That(bool holds, const FieldPath& at, const char* text,
             ErrorCode code = ErrorCode::kOutOfRange, Value value = -1) {
@@ -74,8 +74,8 @@ class Findings {
     Wrong(code, text, {at.parent, at.name, static_cast<std::size_t>(wrong - list.begin())});
   }
 
-  /// Checks that the numbers `key(entry)` of a list are below `count`, which is at most 32, and
-  /// differ.
+  /// Checks that the numbers `key(entry)` of a list are below `count` and differ from each other.
+  /// `count` is at most 32.
   void Keys(const auto& list, auto key, unsigned count, const char* expected, const char* twice,
             const FieldPath& at) {
     std::uint32_t seen = 0;
@@ -105,7 +105,7 @@ class Findings {
     return is_aligned && count <= bounds.max ? count : 0;
   }
 
-  /// Copies a text or a list of numbers, enums or bytes. A span refers to the list instead.
+  /// Copies a text or a list of numbers, enums or bytes. If `out` is a span, it refers to the list.
   template <typename W, typename List>
   void Copy(const flatbuffers::Vector<W>* list, const Bounds& bounds, const FieldPath& at,
             List& out) {

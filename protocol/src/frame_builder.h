@@ -14,8 +14,8 @@ namespace stridewire::protocol {
                                  const FrameLimits& limits, std::vector<std::byte>& frame);
 
 /// Same as AppendFrame for a message of `size` bytes that is not completely in a builder.
-/// BeginFrame appends the header and reserves memory, the caller appends the message, and EndFrame
-/// the padding.
+/// BeginFrame appends the header and reserves memory. Then the caller appends the message, and
+/// EndFrame appends the padding.
 [[nodiscard]] Status BeginFrame(std::size_t size, MessageType type, const FrameLimits& limits,
                                 std::vector<std::byte>& frame);
 void EndFrame(std::size_t size, std::vector<std::byte>& frame);

@@ -6,7 +6,7 @@
 #include "stridewire/protocol/pose_codec.h"
 
 #undef HWY_TARGET_INCLUDE
-// NOLINTNEXTLINE(readability-identifier-naming): Highway's
+// NOLINTNEXTLINE(readability-identifier-naming): Highway requires this name.
 #define HWY_TARGET_INCLUDE "quantise_kernel.cpp"
 #include "hwy/foreach_target.h"
 // Must follow foreach_target.h, which includes this file once per instruction set.
@@ -32,7 +32,7 @@ std::size_t QuantiseRotations(const float* quaternions, std::size_t count, std::
     const std::size_t left = count - i < width ? count - i : width;
     const float* from = quaternions + 4 * i;
     if (left < width) {
-      // Fill unused lanes with the unit quaternion (1, 1, 1, 1) / 2.
+      // Fills unused lanes with the unit quaternion (1, 1, 1, 1) / 2, so that they pass the check.
       for (std::size_t k = 4 * left; k < 4 * width; ++k) in[k] = 0.5f;
       std::memcpy(in, from, 4 * left * sizeof(float));
       from = in;

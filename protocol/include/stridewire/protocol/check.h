@@ -11,8 +11,8 @@ namespace stridewire::protocol {
 ///   kMalformed      an enumerator is unknown, or a text is not UTF-8
 ///   kLimitExceeded  too many items, or a text is too long
 ///   kShapeMismatch  lists that belong together have different lengths
-/// `Error::where` is the path of the field, for example "Request.items.length_m". `index` is the
-/// item, or the offending integer if there are no items.
+/// `Error::where` is the path of the field, for example "Request.items.length_m". `Error::index` is
+/// the index of the item, or the offending integer if the field does not belong to an item.
 template <typename M>
 [[nodiscard]] Status Check(const M& message);
 

@@ -13,7 +13,7 @@ namespace stridewire::protocol {
 
 /// Checks the quantizations of a WorldInfo: references are unit quaternions, numbers are finite and
 /// within the limits of RotationQuantization, and the root uses "smallest three". An empty list
-/// is valid. Fails with kOutOfRange, kMalformed or kLimitExceeded; `index` is the joint.
+/// is valid. Fails with kOutOfRange, kMalformed or kLimitExceeded; Error::index is the joint.
 [[nodiscard]] Status CheckRotationQuantizations(std::span<const RotationQuantization> codes);
 
 /// Checks the joints of PoseDetail::kReduced. `parents` contains the parent of each joint of the
@@ -26,14 +26,14 @@ namespace stridewire::protocol {
 /// A RotationQuantization of one joint in the form that CompactCodec uses.
 struct CompactJoint {
   float reference[4] = {};  ///< x, y, z, w
-  float low[3] = {};
-  /// If the joint uses "smallest three", step[0] applies to all components.
+  float low[3] = {};        ///< Smallest x, y and z that can be encoded.
+  /// Distance of neighbouring values of x, y and z; with "smallest three", step[0] applies to all.
   float step[3] = {};
   float inverse_step[3] = {};  ///< 1 / step
   std::int32_t bits[3] = {};
-  /// Bits per component with "smallest three" encoding; 0: another encoding.
+  /// Bits per component with "smallest three" encoding; 0: x, y and z are encoded.
   std::int32_t smallest_three_bits = 0;
-  float least_w = 0.0f;
+  float least_w = 0.0f;        ///< Smallest w that can be encoded, if x, y and z are encoded.
   std::int32_t parent = -1;    ///< Index of the parent joint; -1 for the root.
   bool has_reference = false;  ///< True if `reference` is not the identity.
   bool has_children = false;
@@ -47,7 +47,7 @@ struct CompactPart {
   std::uint16_t row = 0;  ///< Index of the number in the pose.
   /// Number of bits by which to shift the number left; negative: to the right.
   std::int8_t left = 0;
-  bool ends_word = false;
+  bool ends_word = false;  ///< True for the last part of a word.
 };
 
 /// Encodes and decodes compact poses (STANDARD.md, "Poses"): the quantised root, followed by the
@@ -66,11 +66,11 @@ class CompactCodec {
   /// Block::StreamBytes can write up to this many pieces after the end of a pose.
   static constexpr std::size_t kMaxTrailingPieces = 3;
 
-  /// `codes` and `parents` have one entry per joint. The parent of the root is -1; all others are
-  /// less than the joint's own index. A pose contains the joints in `included`, or all joints if it
-  /// is empty. Fails with the errors of CheckRotationQuantizations and CheckReducedJoints, with
-  /// kShapeMismatch if `codes` and `parents` differ in length, and with kOutOfRange for an invalid
-  /// parent.
+  /// `codes` and `parents` have one entry per joint. The parent of the root is -1; every other
+  /// parent has a lower index than its joint. A pose contains the joints in `included`, or all
+  /// joints if `included` is empty. Fails with the errors of CheckRotationQuantizations and
+  /// CheckReducedJoints, with kShapeMismatch if `codes` and `parents` differ in length or are
+  /// empty, and with kOutOfRange for an invalid parent.
   [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationQuantization> codes,
                                                    std::span<const std::int16_t> parents,
                                                    std::span<const std::uint16_t> included = {});
@@ -78,7 +78,7 @@ class CompactCodec {
   [[nodiscard]] std::size_t joint_count() const { return joints_.size(); }
   /// Size of a pose in bytes.
   [[nodiscard]] std::size_t pose_bytes() const { return pose_bytes_; }
-  /// Number of pieces that contain a pose.
+  /// Number of pieces of kPieceBytes that a pose needs.
   [[nodiscard]] std::size_t pieces() const { return (pose_bytes_ + kPieceBytes - 1) / kPieceBytes; }
 
   /// Poses in structure-of-arrays layout, each with joint_count() joints.
@@ -108,8 +108,8 @@ class CompactCodec {
     void CopyBytes(std::size_t i, std::span<std::byte> out) const;
     /// Same as CopyBytes with non-temporal stores, which bypass the caches; for bytes that are read
     /// much later. Writes `pieces` pieces, at most kMaxTrailingPieces more than the pose needs; the
-    /// excess is unspecified. `to` is aligned to kPieceBytes. Fill whole cache lines: partial ones
-    /// are slow.
+    /// contents of excess pieces are unspecified. `to` is aligned to kPieceBytes. Choose `pieces`
+    /// so that whole cache lines are written: writing part of a line is slow.
     void StreamBytes(std::size_t i, std::size_t pieces, std::byte* to) const;
 
    private:

@@ -19,8 +19,8 @@ class CompactCodecs {
   /// No codecs.
   CompactCodecs() = default;
 
-  /// Makes the codecs of a world. Without `reduced_joints` there is none for PoseDetail::kReduced.
-  /// Fails with the errors of CompactCodec::Make.
+  /// Makes the codecs of a world. If `reduced_joints` is empty, there is no codec for
+  /// PoseDetail::kReduced. Fails with the errors of CompactCodec::Make.
   [[nodiscard]] static Expected<CompactCodecs> Make(std::span<const RotationQuantization> codes,
                                                     std::span<const std::int16_t> parents,
                                                     std::span<const std::uint16_t> reduced_joints);

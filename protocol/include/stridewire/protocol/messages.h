@@ -15,8 +15,8 @@
 /// avatar exists or a step is possible, and it replies item by item.
 namespace stridewire::protocol {
 
-/// Computes the size of each compressed pose of a compact batch; 0 if all poses are uncompressed.
-/// Empty if the size of the batch does not match its flags.
+/// Computes the size in bytes of each compressed pose of a compact batch, or 0 if all poses are
+/// uncompressed. Returns an empty optional if the size of the batch does not match its flags.
 [[nodiscard]] std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch);
 
 /// Returns the record of the i-th avatar.

@@ -37,8 +37,8 @@ class PoseBatchReader {
   const PoseBatch& batch_;
   const CompactCodec* codec_;
   std::size_t compact_bytes_;
-  std::size_t index_ = 0;
-  std::size_t at_ = 0;
+  std::size_t index_ = 0;            // Index of the next pose
+  std::size_t at_ = 0;               // Offset of the next pose in batch_.poses
   PoseMode mode_ = PoseMode::kFull;  // Layout of the current pose
   std::span<const std::byte> pose_;
 };

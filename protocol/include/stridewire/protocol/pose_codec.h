@@ -49,8 +49,8 @@ enum class PoseDetail : std::uint8_t {
                                            : PoseDetail::kAll;
 }
 
-/// Steps per metre of a quantised root position. A step is 2^-14 m (0.061 mm). The error is at most
-/// 2^-15 m (0.031 mm) where float32 is at least as precise, which is the case below 256 m.
+/// Steps per metre of a quantised root position. A step is 2^-14 m (0.061 mm), so a coordinate
+/// changes by at most 2^-15 m (0.031 mm). From 1,024 m on, every float32 is a whole step.
 inline constexpr float kRootStepsPerM = 16384.0f;
 /// Largest coordinate of a quantised root position in metres.
 inline constexpr float kMaxRootM = 131'071.0f;
@@ -60,8 +60,8 @@ inline constexpr float kMaxRootM = 131'071.0f;
 /// Each joint is encoded as three little-endian u16. The component with the largest magnitude is
 /// dropped; if several are equal, the first. If it is negative, the quaternion is negated first.
 /// Each other component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so that 0 is
-/// exact. Bit 15 of the first and second word are bits 0 and 1 of the dropped index; bit 15 of the
-/// third word is 0.
+/// exact. Bit 15 of the first word is bit 0 of the dropped index, bit 15 of the second word is bit
+/// 1, and bit 15 of the third word is 0.
 inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
 
 /// Largest deviation of a quaternion's length from 1.

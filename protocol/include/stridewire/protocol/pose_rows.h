@@ -53,6 +53,7 @@ class PoseRows {
   [[nodiscard]] std::size_t pose_count() const { return pose_count_; }
   [[nodiscard]] std::uint8_t flags(std::size_t row) const { return flags_[row]; }
   [[nodiscard]] bool has_pose(std::size_t row) const { return begins_[row] < begins_[row + 1]; }
+  /// Returns the bytes of the rows from `first` to `last`, inclusive.
   [[nodiscard]] std::span<const std::byte> poses(std::size_t first, std::size_t last) const {
     return std::span(bytes_).subspan(begins_[first], begins_[last + 1] - begins_[first]);
   }
@@ -72,8 +73,8 @@ class PoseRows {
   CompactCodec::Block block_;
 };
 
-/// Copies rows into frames. Reuses its memory: after the first frames, it allocates only `frame`.
-/// Not thread-safe.
+/// Copies rows of PoseRows into frames. Reuses its memory: after the first frames, it allocates
+/// only memory for `frame`. Not thread-safe.
 class PoseBatchComposer {
  public:
   explicit PoseBatchComposer(const FrameLimits& limits = {});
@@ -88,13 +89,14 @@ class PoseBatchComposer {
 
   /// Header fields of a frame that differ between the frames of a tick.
   struct Slice {
-    std::size_t part = 0;
-    std::size_t parts = 1;
-    bool is_partial = false;
+    std::size_t part = 0;     ///< Index of the frame, less than `parts`.
+    std::size_t parts = 1;    ///< Number of frames into which the batch is divided.
+    bool is_partial = false;  ///< True if avatars that are not in the batch may still exist.
   };
 
-  /// Appends a frame with the picked rows that are not empty, or an empty batch. Fails with the
-  /// errors of Check(PoseBatch), and with kLimitExceeded if the rows do not fit in one frame.
+  /// Appends a frame with the picked rows that are not empty. If there are none, the frame contains
+  /// an empty batch. Fails with the errors of Check(PoseBatch), and with kLimitExceeded if the rows
+  /// do not fit in one frame.
   [[nodiscard]] Status Compose(const PoseRows& rows, std::span<const std::uint32_t> picked,
                                const Slice& slice, std::vector<std::byte>& frame);
 
