@@ -7,8 +7,8 @@
 
 namespace stridewire {
 
-// Returns the number of cells per keytime interval for a grid with about `fps` cells per second of
-// the mean interval. `keytimes_s` contains the keytimes of each example.
+// Returns the number of cells per keytime interval for a grid with about `fps` cells per second,
+// for durations averaged over the examples. `keytimes_s` contains the keytimes of each example.
 [[nodiscard]] std::vector<int> CellsAtRate(const std::vector<std::vector<double>>& keytimes_s,
                                            double fps);
 
@@ -16,8 +16,8 @@ namespace stridewire {
 inline constexpr double kStoredErrorRad = 0.45 / 57.29577951308232;
 
 // Chooses the number of grid cells per keytime interval for a group of valid examples. Starts with
-// `fps` cells per second of the mean interval, and adds cells until no example is stored with an
-// error above kStoredErrorRad. More cells are needed for slow examples in a group of fast ones, and
+// the result of CellsAtRate for `fps`, and adds cells until no example is stored with an error
+// above kStoredErrorRad. More cells are needed for slow examples in a group of fast ones, and
 // for captures with fast rotations: with 30 cells per second, steps of subject 01 have a mean error
 // of 0.6 degrees and up to 1.2. The number is limited by the frames of the longest example and by
 // the size of the grid. Generated steps are not measured, since they are smooth. `stand_root`: see

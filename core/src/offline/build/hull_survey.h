@@ -24,7 +24,7 @@ struct HullPoint {
   double weight_sum = 0.0;  // Sum of |w(p)|.
 };
 
-// Evaluates groups of one skeleton that need not belong to a library. Not thread-safe.
+// Evaluates groups with one skeleton. They need not belong to a library. Not thread-safe.
 class GroupProbe {
  public:
   GroupProbe(const Skeleton& skeleton, int max_example_count);

@@ -31,7 +31,7 @@ namespace stridewire {
   return values;
 }
 
-// Returns the scaled distance between two points. Ignores values after the first d.
+// Returns the scaled distance between two points. Ignores values beyond the group's parameters.
 [[nodiscard]] inline double ScaledDistance(const MotionGroup& group, std::span<const double> a,
                                            std::span<const double> b) {
   double sum = 0.0;

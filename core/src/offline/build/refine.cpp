@@ -29,7 +29,8 @@ constexpr std::array kOwnRadiusFactors = {1.0, 1.5, 2.0, 0.7};
 constexpr std::uint32_t kOtherSeed = 0x9e3779b9;
 constexpr int kMaxChecks = 10;
 constexpr std::size_t kNearSamples = 60;
-// Number of samples that are checked first, because most additions fail there.
+// A new pseudoexample is first checked at this many samples with the largest errors, because most
+// rejected ones already fail there.
 constexpr std::size_t kHotSamples = 64;
 
 // The sites of a group: its examples, and the pseudoexamples that have been found so far.
@@ -316,7 +317,8 @@ class GroupRefiner {
     return outcome;
   }
 
-  // Returns the sites with the pseudoexample (p^, w(p*)) added, or nullopt if p* is not found.
+  // Returns the sites with the pseudoexample (p^, w(p*)) added, in the notation of Refine. Returns
+  // nullopt if p* is not found.
   std::optional<Sites> WithPseudoexample(const Candidate& current, const ParameterValues& wanted,
                                          double radius_factor) {
     const Correction solved = probes_[0].Correct(current.group, wanted, kSolve);
@@ -368,7 +370,7 @@ class GroupRefiner {
         const double below_m = best != nullptr    ? best_survey.max_m
                                : pass.accepts_any ? HUGE_VAL
                                                   : survey.max_m * (1.0 - kMinGain);
-        // Checks the hot samples first, because most candidates fail there.
+        // Checks the samples with the largest errors first, because most candidates fail there.
         const bool is_worse = std::any_of(hot.begin(), hot.end(), [&](const ParameterValues& p) {
           const HullPoint point = probes_[0].At((*next)->group, p);
           return point.error_m >= below_m || point.weight_sum > sampled_weight_sum_;

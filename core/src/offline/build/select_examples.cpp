@@ -182,7 +182,7 @@ std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units
     chosen.insert(std::ranges::upper_bound(chosen, worst), worst);
     order.push_back(worst);
   }
-  // Early candidates were chosen before the others were known, so some of them are now redundant.
+  // Candidates that were chosen early may be redundant, because later ones reproduce them.
   for (bool changed = true; changed;) {
     changed = false;
     for (std::size_t k = 0; k < order.size() && chosen.size() > 1; ++k) {

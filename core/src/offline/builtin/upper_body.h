@@ -14,8 +14,8 @@ struct UpperBody {
   double head_nod = 0.0;     ///< In the frame of the example; positive is forward.
   /// Flexion of each arm, indexed by Foot; positive is forward.
   double arm_flexion[2] = {0.0, 0.0};
-  double arm_abduction = 0.0;
-  double elbow_flexion[2] = {0.0, 0.0};
+  double arm_abduction = 0.0;            ///< Of both arms; positive is away from the body.
+  double elbow_flexion[2] = {0.0, 0.0};  ///< Indexed by Foot; positive bends the elbow.
 };
 
 /// Sets the rotations of spine, neck, head and arms. The pelvis must be set before. The angles are

@@ -33,9 +33,9 @@ constexpr double kMinTravel = 0.6;
 constexpr double kTravelRatio = 2.0;
 // A figure on a level floor moves less than this along the up axis.
 constexpr double kMaxRise = 0.3;
-// If no floor decides it, the fixed rotation of the joints above the root is applied to the up axis
-// of the rest pose if this brings the axis closer to the mean direction from the feet to the hips:
-// the cosine of the angle between them must increase by at least this much (RestUpInWorld).
+// Used by RestUpInWorld if no floor determines the up axis. The fixed rotation of the joints above
+// the root is then applied to the up axis of the rest pose only if the cosine of its angle with the
+// mean direction from the feet to the hips increases by at least this much.
 constexpr double kClearGain = 0.5;
 // If the sum of the two unit foot vectors is shorter than this, the feet have no common direction.
 constexpr double kClearFeet = 0.5;

@@ -30,8 +30,8 @@ DVec3 Ball(const MotionLibrary& library, const Clip& clip, int frame, Foot foot)
   return DVec3(BallPosition(library.skeleton(), clip.frame(frame), foot));
 }
 
-// Returns the contacts of planted feet according to the plan of the movement. The landing of a step
-// is the last one.
+// Returns the contacts of planted feet according to the plan of the movement. In a step, the last
+// contact is that of the landing foot.
 std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& movement) {
   std::vector<PlantRecord> plants;
   const Foot last = IsStep(record.kind) ? MovingFoot(record.kind) : Foot::kRight;
@@ -107,7 +107,8 @@ std::string PathOf(std::size_t request, std::span<const LayerCue> layers) {
   return "movements[" + std::to_string(request + static_cast<std::size_t>(before)) + "]";
 }
 
-// Converts the rejection of a step or jump to which no transition path leads into an error.
+// Returns the error for a rejected step or jump. It was rejected because no transition path leads
+// to it.
 Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> requests,
                std::span<const LayerCue> layers) {
   const auto request = std::ranges::find(requests, event.request_id, &MovementRequest::id);

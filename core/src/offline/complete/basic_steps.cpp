@@ -66,11 +66,11 @@ class BasicStepList {
     return stand_width() + share * (std::max(stride().width_m, kMinStrideWidthM) - stand_width());
   }
   // Returns the forward distance between the feet of the stand pose, reduced in proportion to the
-  // length of the step. In full strides nothing of it remains.
+  // length of the step. It is 0 in full strides.
   [[nodiscard]] double StandOffset(double length_m) const {
     return person_.StandVector(foot_).z * (1.0 - std::min(1.0, length_m / full()));
   }
-  // These functions return the vector from the fixed to the moving foot. The moving foot is
+  // Start and End return the vector from the fixed to the moving foot. The moving foot is
   // `length_m` behind the fixed foot at the start of a step, and `length_m` ahead of it at the end.
   [[nodiscard]] DVec3 Start(double length_m, double width_m) const {
     return {SideSign(foot_) * width_m, 0.0, StandOffset(length_m) - length_m};

@@ -166,7 +166,7 @@ std::optional<StandParts> MeasureStandParts(const RawLibrary& library) {
 
 Pose ComposeStand(const Skeleton& skeleton, const LegRig& rig, const StandParts& parts) {
   const double width_m = std::clamp(parts.width_m, kMinStandWidthM, kMaxStandWidthM);
-  // Place the feet, and the root between them.
+  // Places the feet, and the root between them.
   PostureSample mean = parts.mean;
   mean.root_m = DVec3(0.0);
   Pose pose = ToPose(mean);
@@ -187,7 +187,7 @@ Pose ComposeStand(const Skeleton& skeleton, const LegRig& rig, const StandParts&
     middle_m += 0.5 * ankles_m[f];
   }
   DVec3 root(middle_m.x - hips_m.x, 0.0, middle_m.z + kHipsAheadM - hips_m.z);
-  // Lower the root until the straighter leg has the bend kStandKneeRad.
+  // Lowers the root until the straighter leg has the bend kStandKneeRad.
   root.y = HUGE_VAL;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);

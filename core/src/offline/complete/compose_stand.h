@@ -11,7 +11,7 @@
 namespace stridewire::complete {
 
 /// Returns why a pose is not a stand with both feet side by side on the ground, for example "one
-/// foot is 0.31 m ahead of the other". Returns nullopt if it is one.
+/// foot is 0.31 m ahead of the other". Returns nullopt if the pose is such a stand.
 [[nodiscard]] std::optional<std::string> WhyNoStand(const Skeleton& skeleton, const LegRig& rig,
                                                     const Pose& pose);
 

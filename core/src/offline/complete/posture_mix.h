@@ -36,10 +36,10 @@ struct PostureSample {
 [[nodiscard]] PostureSample Blend(const PostureSample& a, const PostureSample& b,
                                   double share_of_b);
 
-/// Writes the same to `out`, whose memory it reuses. `out` may be one of the two samples.
+/// Writes the blend of two samples to `out`, whose memory it reuses. `out` may be `a` or `b`.
 void Blend(const PostureSample& a, const PostureSample& b, double share_of_b, PostureSample& out);
 
-/// Writes only the root and the feet.
+/// Blends only the root and the feet of two samples, and writes them to `out`.
 void BlendFeet(const PostureSample& a, const PostureSample& b, double share_of_b,
                PostureSample& out);
 
@@ -55,7 +55,7 @@ void BlendFeet(const PostureSample& a, const PostureSample& b, double share_of_b
 [[nodiscard]] double LegLength(const Skeleton& skeleton, const LegRig& rig,
                                const PostureSample& sample, Foot foot);
 
-/// Converts to a pose in single precision.
+/// Converts a sample to a pose in single precision.
 [[nodiscard]] Pose ToPose(const PostureSample& sample);
 
 }  // namespace stridewire::complete

@@ -153,7 +153,7 @@ class StepGenerator {
   }
 
  private:
-  // A foot at some time. Positions are relative to the fixed ball.
+  // State of a foot at one time. Positions are relative to the ball of the fixed foot.
   struct FootState {
     DQuat ankle_rotation;       // World rotation of the ankle.
     DVec3 ball_m = DVec3(0.0);  // Without the detour and the lift, which BallOf adds.
@@ -233,7 +233,7 @@ class StepGenerator {
     state.ankle_rotation = AnkleRotationAt(foot, time_s);
     state.ball_m = PlainBallAt(foot, time_s);
     state.swing = foot == fixed_ ? 0.0 : Bump(SwingAt(GenericAt(time_s)));
-    // Follow the joints from the ankle to the ball.
+    // Follows the joints from the ankle to the ball.
     const LegRig::Side& side = person_.rig.side(foot);
     const double share = LegShareAt(foot, time_s);
     DVec3 position(0.0);

@@ -41,9 +41,9 @@ struct StrideModel {
   [[nodiscard]] double LegAt(double generic_time) const;
   /// Writes the posture at a generic time in [0, 3] to `out`, whose memory it reuses.
   void Sample(double generic_time, PostureSample& out) const;
-  /// Writes only the root, the feet and the rotations of `joints`.
+  /// Same, but writes only the root, the feet and the rotations of `joints`.
   void Sample(double generic_time, std::span<const std::size_t> joints, PostureSample& out) const;
-  /// Returns the velocity of the root at the start of the mean stride, in m/s.
+  /// Return the velocities of the root at the start and at the end of the mean stride, in m/s.
   [[nodiscard]] DVec3 MeasuredStartVelocity() const;
   [[nodiscard]] DVec3 MeasuredEndVelocity() const;
 };

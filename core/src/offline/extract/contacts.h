@@ -13,7 +13,7 @@ struct ContactOptions {
   double speed_max_m_s = 0.8;  ///< Maximum speed of a standing point.
   /// Maximum height of a standing point above its resting height during that contact.
   double height_max_m = 0.06;
-  double smooth_s = 0.04;
+  double smooth_s = 0.04;       ///< Paths of feet are smoothed over this time.
   double gap_min_s = 0.05;      ///< Shorter gaps between contacts are closed.
   double contact_min_s = 0.07;  ///< Shorter contacts are dropped.
 };

@@ -93,7 +93,7 @@ class Extractor {
     return clip_.Validate();
   }
 
-  // Excludes still poses at the ends that are not connected to the motion.
+  // Excludes a still pose at either end of the capture if a jump separates it from the motion.
   void SetAsideStillEnds() {
     const FrameRange all{capture_.first_frame, clip_.frame_count()};
     const FrameRange frames = WithoutStillEnds(capture_.skeleton, clip_, capture_.first_frame);

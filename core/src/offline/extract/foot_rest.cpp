@@ -146,8 +146,8 @@ class RestFinder {
     if (ComesToRest({end, range.end})) Collect({end, range.end});
   }
 
-  // Merges contacts at one height or place that are separated by short gaps. Separates contacts
-  // without a gap.
+  // Merges contacts at one height or place that are separated by short gaps. Inserts a gap between
+  // contacts that follow each other without one.
   void Join() {
     std::vector<Contact> joined;
     for (Contact& contact : found_) {

@@ -48,8 +48,8 @@ struct SelfCheck {
 ///   soles        Soles of standing feet are at most 1 cm above the ground, and the ball of a foot
 ///                is never more than 1 cm below it.
 ///
-/// The same library always gives the same results. The checks take between some milliseconds and
-/// some tenths of a second. `library` must not be null.
+/// The same library always gives the same results. The checks take from a few milliseconds to a few
+/// tenths of a second. `library` must not be null.
 [[nodiscard]] SelfCheck CheckLibrary(const std::shared_ptr<const MotionLibrary>& library);
 
 /// Returns the overall result in one sentence, for example "Self-check passed."
