@@ -18,7 +18,7 @@ class BuildReport {
  public:
   explicit BuildReport(bool as_json);
 
-  // Reports on a file, and prints on stderr why the file is unusable if it is.
+  // Reports on a file. If the file is unusable, prints the reason on stderr.
   void AddFile(const Extraction& extraction, const AssembleOptions& options);
 
   // Reports which movements the captures lack, and which were generated instead.

@@ -15,7 +15,8 @@ namespace {
 
 constexpr double kExportFps = 120.0;
 
-// Samples a stored example: the movement with weight 1 for it, from its first to its last keytime.
+// Samples a stored example from its first to its last keytime, as the movement in which it has the
+// weight 1.
 Clip ExampleClip(const MotionLibrary& library, int group_index, int example) {
   const MotionGroup& group = library.group(group_index);
   const int joint_count = library.skeleton().joint_count();

@@ -12,7 +12,7 @@ namespace stridewire {
 // that other programs can recompute the interpolation.
 [[nodiscard]] nlohmann::ordered_json LibraryToJson(const MotionLibrary& library, bool examples);
 
-// {"start_z_m": ..., "end_z_m": ...}
+// Returns parameters with their units, for example {"start_z_m": ..., "end_z_m": ...}.
 [[nodiscard]] nlohmann::ordered_json ParametersToJson(const MotionGroup& group,
                                                       const ParameterValues& values);
 [[nodiscard]] nlohmann::ordered_json BaseToJson(const BaseFrame& base);
@@ -20,12 +20,13 @@ namespace stridewire {
 // Serializes JSON that may contain text from a file; invalid UTF-8 is replaced.
 [[nodiscard]] std::string Dump(const nlohmann::ordered_json& json);
 
-// The layers of a library, as JSON and as text on stdout.
+// Return the layers of a library as JSON, or print them on stdout.
 [[nodiscard]] nlohmann::ordered_json LayersToJson(const MotionLibrary& library);
 void PrintLayers(const MotionLibrary& library);
 
-// The transitions of a library. The JSON has one entry per pair of groups. The text has the best
-// transition per pair of movement kinds, and with `examples` the examples it connects.
+// Return the transitions of a library as JSON, with one entry per pair of groups, or print them on
+// stdout. The text has the best transition per pair of movement kinds, and with `examples` also the
+// two examples that the transition connects.
 [[nodiscard]] nlohmann::ordered_json TransitionsToJson(const MotionLibrary& library);
 void PrintTransitions(const MotionLibrary& library, bool examples);
 

@@ -28,7 +28,8 @@ std::string MapBlock(const std::string& name, const ErrorMap& map) {
   return block + "EOD\n";
 }
 
-// Data blocks with the examples and pseudoexamples, projected on the axes of the figure.
+// Returns gnuplot data blocks with the examples and pseudoexamples, projected on the axes of the
+// figure.
 std::string SiteBlocks(const MotionGroup& group, const FigureAxes& axes,
                        const std::string& suffix) {
   std::array<std::string, 2> blocks;

@@ -16,11 +16,11 @@ namespace stridewire {
 using HtmlTable = std::vector<std::vector<std::string>>;
 [[nodiscard]] std::string TableHtml(const HtmlTable& rows);
 
-// A figure with its caption. The SVG is embedded in the page.
+// Returns a figure with its caption. The SVG is embedded in the page.
 [[nodiscard]] std::string PictureHtml(std::string_view svg, std::string_view caption,
                                       std::string_view file);
 
-// The whole page. `body` must be HTML.
+// Returns the whole page. `body` must be HTML.
 [[nodiscard]] std::string PageHtml(std::string_view title, std::string_view body);
 
 }  // namespace stridewire
