@@ -66,8 +66,8 @@ ConfigKey Address(const char* name, const char* help, Endpoint Config::* member)
           .get = [member](const Config& config) { return ToText(config.*member); }};
 }
 
-// Converts between text and a list of strings, separated by commas. `check` rejects items that
-// contain a comma.
+// A key for a list of strings. In text, commas separate them. `check` rejects items that contain a
+// comma.
 ConfigKey List(const char* name, const char* help, std::vector<std::string> Config::* member,
                Status (*check)(std::string_view)) {
   return {.name = name,

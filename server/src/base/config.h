@@ -51,15 +51,15 @@ struct Config {
   std::string library = "builtin";
   std::string data_dir;  ///< Reserved for stored worlds; the server writes nothing yet.
   double tick_hz = 60.0;
-  int shards = 0;  ///< Number of shards. 0: one per processor.
-  int max_catch_up_ticks = 10;
+  int shards = 0;                   ///< Number of shards. 0: one per processor.
+  int max_catch_up_ticks = 10;      ///< Maximum number of missed ticks that avatars catch up on.
   bool run_time_correction = true;  ///< True: the blend weights of each movement are corrected.
   /// True: feet stay fixed on the ground between landing and lifting.
   bool foot_planting = true;
   bool idle_motion = true;       ///< True: standing avatars breathe, sway and shift their weight.
   bool stride_variation = true;  ///< True: equal steps vary slightly, like the steps of people.
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
-  bool allow_insecure = false;
+  bool allow_insecure = false;   ///< True: the server may listen on addresses of a network.
   /// True: when a client joins a world that the file does not name, the server creates it.
   bool open_worlds = true;
   bool persistent = false;  ///< WorldConfig::persistent for worlds that the file does not name.

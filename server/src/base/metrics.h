@@ -59,12 +59,12 @@ struct alignas(128) ThreadMetrics {
   Count ticks_missed;
   Count ticks_slipped;      ///< Number of missed ticks that avatars did not catch up on.
   Count cpu_ns;             ///< CPU time of the thread in ns; shards only.
-  TimeHistogram tick;       ///< Duration of a tick, from commands to published batches.
+  TimeHistogram tick;       ///< Duration of a tick: executing commands to publishing batches.
   TimeHistogram tick_late;  ///< Delay between the due time and the start of a tick.
   Count poses_encoded;
   Count movements_encoded;
   Count poses_sent;
-  Count batches_composed;  ///< Batches that were composed for one session or one set of rows.
+  Count batches_composed;  ///< Frames composed for sessions that observe only some avatars.
   Count batches_sent;
   Count websocket_messages_sent;
   Count batches_dropped;

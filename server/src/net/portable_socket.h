@@ -40,8 +40,8 @@ class PortableSocket {
   }
   [[nodiscard]] bool ShutDownSending();
   void Close();
-  /// Leaves its io_context. No operation may be pending. Afterwards only Attach may be called, on
-  /// any thread.
+  /// Removes the socket from its io_context. No operation may be pending. Afterwards only Attach
+  /// may be called, on any thread.
   void Detach();
   [[nodiscard]] bool Attach(boost::asio::io_context& context);
 

@@ -35,8 +35,8 @@ class TcpTransport final : public Transport {
     buffers_.clear();
     for (const SharedFrame& frame : frames) buffers_.emplace_back(frame->data(), frame->size());
     first_buffer_ = 0;
-    // The system usually has room for all frames of a tick. Waiting for the socket to become
-    // writable first would add 10 % to the cost of a small frame.
+    // The system usually has room for all frames of a tick, so the first write is tried at once.
+    // Waiting for the socket to become writable would add 10 % to the cost of a small frame.
     while (first_buffer_ < buffers_.size()) {
       const std::size_t bytes = socket_.WriteWhatFits(unsent());
       if (bytes == 0) {
