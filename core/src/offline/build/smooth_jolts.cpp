@@ -55,7 +55,7 @@ class JoltFilter {
         spacing_s_(spacing_s),
         deviation_s_(track.size(), 0.0) {}
 
-  // Returns false if there is nothing to smooth.
+  // Smooths the track. Returns false if it has no jolts, and then changes nothing.
   bool Run() {
     bool is_smoothed = false;
     for (int round = 0; round < kMaxWidenings && WidenAtJolts(); ++round) {

@@ -42,7 +42,7 @@ struct RollOff {
 ///
 ///        heel-strike   state      toe-off
 ///   front      a        0.32 a       0       foot pitch; positive raises the toes
-///   rear   -0.15 b     -0.40 b      -b      `RollOff`, in straight walking
+///   rear   -0.15 b     -0.40 b      -b      `RollOff`, in straight steps up to 0.55 m
 struct GaitState {
   double length_m = 0.0;
   /// Time from heel-strike to the state, and from the state to toe-off.

@@ -64,8 +64,8 @@ Curve PerStep(const StepTiming& timing, const Oscillation& start, const Oscillat
                 {timing.end_s, end.middle + end.amplitude, 0.0}});
 }
 
-// Perry and Burnfield, Gait Analysis: the shoulder moves between 24 degrees of extension and 8 of
-// flexion, the elbow between 20 and 45 degrees of flexion.
+// The ranges of shoulder and elbow are close to those of Perry and Burnfield, Gait Analysis: the
+// shoulder moves between 24 degrees of extension and 8 of flexion, the elbow from 20 to 45 degrees.
 Oscillation Arm(const GaitState& state) {
   const double forward = Mix(kStandingArmRad, 12.0 * kDegree, state.vigour);
   const double back = Mix(kStandingArmRad, -22.0 * kDegree, state.vigour);

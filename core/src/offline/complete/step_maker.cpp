@@ -201,7 +201,7 @@ class StepGenerator {
   static double SwingAt(double generic) {
     return std::clamp((generic - kSwingBegin) / (kSwingEnd - kSwingBegin), 0.0, 1.0);
   }
-  // Weight of the captured stride for the swinging foot.
+  // Weight of the captured stride for the swinging foot, at least kMinSwingShare in mid-swing.
   [[nodiscard]] double SwingShareAt(double time_s) const {
     const double share = ShareAt(time_s);
     return share + std::max(0.0, kMinSwingShare - share) * Bump(SwingAt(GenericAt(time_s)));
@@ -249,8 +249,8 @@ class StepGenerator {
     state.ankle_to_heel = state.ankle_rotation * DVec3(side.heel_m);
     return state;
   }
-  // Weight of the captured stride for the joints of a leg. The moving leg uses a larger weight of
-  // the captured swing, so that it bends in the plane of the capture.
+  // Weight of the captured stride for the joints of a leg. The moving leg has the weight of the
+  // swinging foot, which is larger during the swing, so that it bends in the plane of the capture.
   [[nodiscard]] double LegShareAt(Foot foot, double time_s) const {
     return std::min(1.0, foot == moving_ ? SwingShareAt(time_s) : ShareAt(time_s));
   }

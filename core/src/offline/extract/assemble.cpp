@@ -234,7 +234,8 @@ class Assembler {
       if (has_climbs && !keeps_heights) has_dropped_climbs = true;
       if (!has_climbs || !keeps_heights) all_steps[f].examples.clear();
       if (level_count <= straight_count) level_steps[f].examples.clear();
-      // With two examples, parameters off the line between them could not be reproduced.
+      // Omits small groups if another group has their steps. Two examples, for instance, could
+      // reproduce only parameters on the line between them.
       const bool has_all = !all_steps[f].examples.empty();
       if (has_all && level_count < kMinForAnArea) level_steps[f].examples.clear();
       if ((has_all || !level_steps[f].examples.empty()) && straight_count < kMinForAnArea) {

@@ -287,8 +287,8 @@ class Extractor {
            FootVectorAt(step.moving, step.start, heading).z;
   }
 
-  // Returns the mean pelvis yaw around a moment of standing. For jumps, the stride heading averages
-  // over too long a time.
+  // Returns the mean pelvis yaw around a moment of standing. It is the heading at the ends of a
+  // jump, for which the stride heading averages over too long a time.
   [[nodiscard]] double StandingYaw(int frame) const {
     const int reach = static_cast<int>(std::lround(kStandingYawS * 0.5 * clip_.fps));
     const int begin = std::max(0, frame - reach);

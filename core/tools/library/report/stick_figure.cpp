@@ -10,7 +10,8 @@
 namespace stridewire {
 namespace {
 
-// A joint this far from the root sideways belongs to that side, regardless of its name.
+// Sides are determined by positions, not by names: in the stand pose, a left or right joint is at
+// least this far to that side of the root.
 constexpr float kSideMinM = 0.04f;
 
 }  // namespace
