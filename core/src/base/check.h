@@ -7,7 +7,7 @@ namespace stridewire {
 
 }  // namespace stridewire
 
-/// Aborts the program if an invariant of this code base does not hold. It is active in every build.
-/// Use it only for conditions that a bug could break. Invalid input returns an Error instead.
+/// Aborts the program if an invariant of this code base does not hold. The check is active in every
+/// build. Use it only for conditions that only a bug can break. For invalid input, return an Error.
 #define STRIDEWIRE_CHECK(condition) \
   ((condition) ? (void)0 : ::stridewire::CheckFailed(#condition, __FILE__, __LINE__))

@@ -62,8 +62,8 @@ double AngleBetween(const Quat& a, const Quat& b) {
   const double s2 = d.x * d.x + d.y * d.y + d.z * d.z;
   const double w2 = d.w * d.w;
   if (s2 >= 0.01 * w2) return 2.0 * Atan2(std::sqrt(s2), std::fabs(d.w));
-  // Most angles are small: those between successive frames, for example. The angle is 2 atan(t).
-  // Up to t = 0.1, the first term that is left out is less than 1e-14 rad.
+  // Most angles are small, for example those between successive frames. The angle is 2 atan(t) with
+  // t^2 = s2 / w2. For t <= 0.1, the first omitted term of the series is below 2e-16 rad.
   const double t2 = s2 / w2;
   constexpr double kSeries[] = {-1.0 / 3.0, 1.0 / 5.0,   -1.0 / 7.0,
                                 1.0 / 9.0,  -1.0 / 11.0, 1.0 / 13.0};

@@ -7,7 +7,7 @@ namespace stridewire {
 
 inline constexpr std::size_t kCacheLineBytes = 64;
 
-/// Prefetches `bytes` bytes of memory that will be read soon. It affects only the running time.
+/// Prefetches `bytes` bytes of memory that will be read soon. This affects only the running time.
 inline void PrefetchBytes(const void* at, std::size_t bytes) {
   const std::size_t in_line = reinterpret_cast<std::uintptr_t>(at) % kCacheLineBytes;
   const auto* from = static_cast<const char*>(at) - in_line;

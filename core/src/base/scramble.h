@@ -4,8 +4,8 @@
 
 namespace stridewire {
 
-/// Maps numbers to unrelated numbers, even if the arguments are neighbours (SplitMix64; Steele, Lea
-/// and Flood 2014).
+/// Returns a hash of a number. Even neighbouring numbers have unrelated hashes (SplitMix64; Steele,
+/// Lea and Flood 2014).
 [[nodiscard]] constexpr std::uint64_t Scramble(std::uint64_t number) {
   std::uint64_t bits = number + 0x9e3779b97f4a7c15u;
   bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;

@@ -5,9 +5,9 @@ namespace stridewire {
 /// Trigonometry that uses only additions, multiplications, divisions and square roots.
 ///
 /// The C libraries of different systems differ in the last bit of sin, cos, acos and atan2. These
-/// functions return the same bits on every machine, and everything that evaluates a movement relies
-/// on that. For |x| <= 1e5 the absolute error is below 1e-15 (angles in radians). A test compares
-/// them with the C library.
+/// functions return the same bits on every machine, so that poses are the same everywhere. For
+/// |x| <= 1e5 the absolute error is below 1e-15 (angles in radians). A test compares them with the
+/// C library.
 [[nodiscard]] double Sin(double x_rad);
 [[nodiscard]] double Cos(double x_rad);
 

@@ -18,8 +18,8 @@ static_assert(sizeof(Quat) == 16 && sizeof(Vec3) == 12);
 
 inline constexpr Quat kIdentityQuat = Quat(1.0f, 0.0f, 0.0f, 0.0f);
 
-/// Returns the rotation about +Y: (0, sin a/2, 0, cos a/2) in x, y, z, w. Gives the same bits on
-/// every machine.
+/// Returns the rotation by a = `yaw_rad` about +Y: (0, sin a/2, 0, cos a/2) in x, y, z, w. Gives
+/// the same bits on every machine.
 [[nodiscard]] Quat YawRotation(double yaw_rad);
 
 /// Computes the heading of a rotation: atan2(z'_x, z'_z) with z' = q z q^-1 (paper, Section 5). If

@@ -9,9 +9,9 @@ namespace stridewire {
 
 /// Describes how the rotation q of one joint is quantized. Let d = conj(reference) q, negated if
 /// its w is negative. The components x, y and z of d are encoded: a component low + k * step is
-/// stored as the integer k in `bits` bits. A component without bits is `low`. The decoder computes
-/// w from the other components. A joint that may rotate in any direction uses smallest-three
-/// encoding of q instead, with `smallest_three_bits` per component.
+/// stored as the integer k in `bits` bits. A component with 0 bits always has the value `low`. The
+/// decoder computes w from the other components. A joint that may rotate in any direction uses
+/// smallest-three encoding of q instead, with `smallest_three_bits` per component.
 struct RotationQuantization {
   static constexpr std::uint8_t kMaxBits = 16;
   static constexpr std::uint8_t kMinFreeBits = 8;
@@ -23,7 +23,8 @@ struct RotationQuantization {
 
   Quat reference = kIdentityQuat;
   Vec3 low = Vec3(0.0f);  ///< Minimum of each component, in [-1, 1].
-  /// Difference between successive values, kMinStep to 2; unused if a component has no bits.
+  /// Difference between successive values of each component, kMinStep to 2. Unused for components
+  /// with 0 bits.
   Vec3 step = Vec3(1.0f);
   std::array<std::uint8_t, 3> bits{};  ///< Bits of each component, 0 to kMaxBits.
   /// Bits per component of smallest-three encoding, kMinFreeBits to kMaxFreeBits; 0: not used.

@@ -17,15 +17,15 @@ namespace stridewire {
 /// A direction along one of the file's own axes.
 enum class BvhAxis : std::uint8_t { kPlusX, kMinusX, kPlusY, kMinusY, kPlusZ, kMinusZ };
 
-/// Source of the up axis of a capture. kGuess means that the figure stands neither in the rest pose
-/// nor in the motion.
+/// Source of the up axis of a capture. kGuess: the figure stands neither in the rest pose nor in
+/// the motion, so the up axis may be wrong.
 enum class UpSource : std::uint8_t { kOption, kRestPose, kMotion, kGuess };
 
 /// A complete recording that was read from a file and converted to the conventions of base/math.h:
 /// metres, +Y up, facing +Z at identity rotations.
 struct Capture {
   std::string path;   ///< Path of the file, as passed by the caller.
-  Skeleton skeleton;  ///< Skeleton whose legs have both been identified.
+  Skeleton skeleton;  ///< Skeleton in which the reader has identified both legs.
   Clip clip;
   double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
   /// False: none of the usual units, such as the centimetre, gives legs of plausible length. The
@@ -82,15 +82,16 @@ struct BvhReadOptions {
 ///   channels becomes the offset, and a note states the largest deviation from it. If the mean
 ///   moves a joint of the legs, the trunk or the arms by more than 2 cm, the file is rejected. If
 ///   all positions of a joint are zero, its OFFSET is kept.
-/// - `Frame Time` is rounded to a whole number of frames per second if its digits allow it.
-/// - The reader detects legs by joint names, whose end contains the side and the part of the leg.
-///   If that fails, it takes the longest pair of equally long chains that start nearest to the root
-///   and whose ends are below the rest of the body. A joint that never bends the leg divides the
-///   thigh or the shin, but is not the knee. A figure without two legs, or with more than two, is
-///   rejected. If there is no toe joint, the ball of the foot is a fixed point in the frame of the
-///   ankle. This point is the End Site of the foot if that is nearer than 0.2 leg lengths.
-///   Otherwise its horizontal distance from the ankle is 2/3 of that of the End Site, and it is as
-///   high as the End Site when the sole is flat.
+/// - If `Frame Time` agrees with a whole number of frames per second within the precision of its
+///   digits, the reader uses that number.
+/// - The reader detects legs by joint names that end in the side and the part of the leg. If that
+///   fails, it looks for two chains of equal length that start at the same joint and end below the
+///   rest of the body. It takes the pair nearest to the root; of several such pairs, the longest. A
+///   joint that never bends the leg divides the thigh or the shin, but is not the knee. A figure
+///   without two legs, or with more than two, is rejected. If there is no toe joint, the ball of
+///   the foot is a fixed point in the frame of the ankle. This point is the End Site of the foot if
+///   the End Site is nearer than 0.2 leg lengths. Otherwise its horizontal distance from the ankle
+///   is 2/3 of that of the End Site, and it is as high as the End Site when the sole is flat.
 /// - If the figure stands in the rest pose, this pose determines the up axis. If it does not, or if
 ///   it clearly stands and moves along another axis in the motion, the up axis is the mean
 ///   direction from ankles to hips over the motion. A rest pose that stands is turned to face +Z.

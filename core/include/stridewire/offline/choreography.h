@@ -56,7 +56,7 @@ struct Choreography {
   BaseFrame start;
   std::shared_ptr<const Terrain> terrain;  ///< Terrain of the world; null: flat ground.
   /// Together with `layers`, 1 to kMaxChoreographyMovements entries. The id of a request is its
-  /// position in the JSON list, which starts at 1 and includes layers.
+  /// position in the JSON list, counted from 1 and including layers.
   std::vector<MovementRequest> movements;
   std::vector<LayerCue> layers;
 };

@@ -17,14 +17,14 @@ namespace stridewire {
 struct SelectionOptions {
   /// Maximum error of a step that is not kept: the mean distance between its joints and those of
   /// the step blended from the kept examples, at equal generic times. It is also the maximum
-  /// distance between the step's parameters and the hull of the kept examples, enlarged by 10 %. In
-  /// metres; one radian counts as 0.5 m. 0 keeps every step.
+  /// distance of the step's parameters from the hull of the kept examples, after that hull has been
+  /// enlarged by 10 %. In metres; one radian counts as 0.5 m. 0 keeps every step.
   double max_pose_error_m = 0.0;
   /// For each step, the other steps predict its pose and duration from its parameters. The step is
   /// an outlier if the error of a prediction exceeds the median error of the group by more than
-  /// this number of deviations (1.4826 MAD). Only steps inside the hull of the others are tested,
-  /// in groups of at least eight. At most one in ten is removed, because steps at the border of the
-  /// hull are rare, not wrong. 0 disables the test.
+  /// this number of deviations (1.4826 times the median absolute deviation). Only steps inside the
+  /// hull of the others are tested, in groups of at least eight, because steps at the border of the
+  /// hull are rare, not wrong. At most one step in ten is removed. 0 disables the test.
   double outlier_deviations = 0.0;
 };
 
@@ -33,7 +33,7 @@ enum class ExampleFate : std::uint8_t {
   kKept,       ///< Stored as a separate example.
   kAveraged,   ///< Stored as part of an average.
   kRedundant,  ///< Not stored, because the kept examples reproduce it.
-  kOutlier     ///< Not stored, because it differs from all other examples.
+  kOutlier     ///< Not stored, because it differs from what the other examples predict.
 };
 
 /// Returns "kept", "averaged", "redundant" or "outlier".
@@ -45,7 +45,8 @@ struct SelectedExample {
   bool mirrored = false;
   ExampleFate fate = ExampleFate::kKept;
   int example = -1;  ///< Index in the library's group; -1 if not stored.
-  /// If not stored: distance to the step blended with its parameters, in metres.
+  /// If not stored: mean distance between its joints and those of the step that the library blends
+  /// for its parameters, in metres.
   double error_m = 0.0;
   std::string reason;  ///< One sentence.
 };
@@ -58,7 +59,9 @@ struct GroupSelection {
   /// Ridge factor with which the stored examples were smoothed (LibraryBuilder::smooths). 0 if they
   /// are stored as captured.
   double ridge = 0.0;
-  double ridge_radius = 0.0;  ///< Radius of the radial functions, in units of Parameter::scale.
+  /// Radius of the radial functions of the smoothing, in units of Parameter::scale; 0 without
+  /// smoothing.
+  double ridge_radius = 0.0;
 
   /// Number of examples with this fate.
   [[nodiscard]] int Count(ExampleFate fate) const;
@@ -68,36 +71,38 @@ struct GroupSelection {
 /// generic-time grid, aligns quaternion hemispheres, selects or averages examples as configured,
 /// and solves for the interpolation weights.
 struct LibraryBuilder {
-  /// Returns a builder configured to store all captured movements. It bends toes that are in the
-  /// ground and changes nothing else.
+  /// Returns a builder configured to store all captured movements. It bends toes upward where they
+  /// are below the ground, and changes nothing else.
   [[nodiscard]] static LibraryBuilder KeepingAll();
   /// Returns a builder configured to keep a representative selection of captured movements. It
   /// averages movements within 5 cm of each other. It drops outliers beyond five deviations, and
   /// movements that the others reproduce within 2.5 cm. Finally, it smooths the kept movements and
-  /// bends toes that are in the ground.
+  /// bends toes upward where they are below the ground.
   [[nodiscard]] static LibraryBuilder Selecting();
 
   /// Approximate number of grid cells per second of mean duration. Intervals in which an example
   /// would be stored with an error above 0.45 degrees have more cells.
   double grid_fps = 30.0;
-  /// Examples are averaged if all their parameters are within this distance of each other, in
-  /// metres; a radian counts as 0.5 m. Uses complete linkage. 0 disables averaging.
+  /// Examples are averaged if their parameters are within this distance of each other, in metres; a
+  /// radian counts as 0.5 m. They are grouped by complete-linkage clustering. 0 disables averaging.
   double cluster_diameter = 0.0;
   /// Determines which examples are not stored after averaging. By default, all are stored.
   SelectionOptions selection;
   /// True: the selected examples are replaced with a smooth function of their parameters that is
   /// robust against outliers. It contains what the examples have in common, without individual
-  /// variation. Leave-one-out pose errors determine the smoothness. Groups with fewer than 4 (d +
-  /// 1) examples (d parameters) remain unchanged.
+  /// variation. Leave-one-out pose errors determine the smoothness. Groups of d parameters with
+  /// fewer than 4 (d + 1) examples remain unchanged.
   bool smooths = false;
-  /// True: in groups that were not completed, toes bend upward where their tips are in the ground.
+  /// True: toes bend upward where their tips are below the ground. This does not apply to generated
+  /// groups (RawGroup::is_completed).
   bool bends_toes = false;
 
   struct Note {
     int group = 0;
     std::string text;
   };
-  /// Output of Build: merged duplicates and parameter directions in which no example varies.
+  /// Output of Build: notes on merged duplicates, and on parameter directions in which no example
+  /// varies.
   std::vector<Note> notes;
   std::vector<GroupSelection> selections;  ///< Output of Build, one per group.
 

@@ -34,7 +34,8 @@ struct RawGroup {
   bool is_completed = false;
 };
 
-/// A clip for a LayerClip, which is blended over movements. It animates all joints of the skeleton.
+/// Input for a LayerClip, which is blended over movements. `clip` contains all joints of the
+/// skeleton, and `weights` selects those that the layer affects.
 struct RawLayer {
   std::string name;
   /// Motion of the layer. If `is_looping`, its last frame equals the first.

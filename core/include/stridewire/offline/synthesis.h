@@ -13,7 +13,8 @@
 
 namespace stridewire {
 
-/// A time span within a movement during which a foot stands on the ground.
+/// A time span within a movement during which a foot stands on the ground. Times are seconds since
+/// the start of the choreography.
 struct PlantRecord {
   Foot foot = Foot::kLeft;
   double from_s = 0.0;
@@ -34,18 +35,18 @@ struct MovementRecord {
   std::vector<double> keytimes_s;
   ParameterValues requested;
   ParameterValues applied;  ///< `requested` after clamping to the range of the examples.
-  /// sum w_i p_i over the examples: the parameters that correspond to the weights of the blend. The
-  /// weight correction chooses the weights so that `measured` equals `applied`.
+  /// Weighted sum of the examples' parameters, with the weights of the blend. The weight correction
+  /// chooses these weights so that `measured` equals `applied`.
   ParameterValues corrected;
-  ParameterValues measured;  ///< Parameters measured on the synthesized movement, a(p).
+  ParameterValues measured;  ///< Parameters measured on the movement, a(p) in the paper.
   bool extrapolated = false;
   bool clamped = false;
   std::vector<float> weights;
   std::vector<PlantRecord> plants;
-  /// Steps only: horizontal distance of the moving foot from its target when it first stands.
+  /// Steps only: horizontal distance of the moving foot from its target when it has just landed.
   /// Without planting: distance between the measured and the requested end parameters.
   double landing_error_m = 0.0;
-  /// Difference between the heading of that foot and that of its target.
+  /// Difference between the heading of the moving foot and that of its target at that time.
   double landing_error_rad = 0.0;
   BaseFrame base;  ///< Base frame after the movement.
 };
@@ -70,8 +71,8 @@ struct SkippedRequest {
 
 /// Starts, changes or stops a layer when a movement begins.
 struct LayerCue {
-  /// Index of that movement in the list of requests. The number of requests is allowed as well, but
-  /// such a cue has no visible effect, because no movement follows it.
+  /// Index, in the list of requests, of the movement with which the cue takes effect. The number of
+  /// requests is allowed as well. It has no visible effect, because no movement follows.
   std::size_t before = 0;
   std::string layer;  ///< Name of the layer.
   bool enabled = true;

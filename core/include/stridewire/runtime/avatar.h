@@ -47,7 +47,7 @@ struct DroppedRequest {
   RequestOutcome outcome = RequestOutcome::kNone;
 };
 
-/// A step or jump in terms of StepRequest or JumpRequest.
+/// Measures of a step or jump, with the meaning that StepRequest and JumpRequest give them.
 struct StepMeasures {
   double length_m = 0.0;
   double side_m = 0.0;  ///< 0 for jumps.
@@ -56,17 +56,18 @@ struct StepMeasures {
 };
 
 /// Describes by how much a rejected step or jump would have missed its request. For steps with
-/// `exact_only` the values are exact. For others, their error is a few centimetres.
+/// `exact_only` the values are exact. For others, they are accurate to a few centimetres.
 struct FootprintError {
-  /// Nearest footprint in reach. For a jump: midpoint between the feet, and heading, after the
-  /// jump.
+  /// Nearest footprint in reach. For a jump: the midpoint between the feet and the heading of the
+  /// avatar after the nearest jump.
   Footprint nearest;
   double distance_m = 0.0;  ///< Distance from `nearest` to the requested place, >= 0.
-  /// Angle between the directions of the paths or between the headings, whichever is larger, >= 0.
-  /// With `exact_only`: between the headings of the footprints.
+  /// The larger of two angles: between the directions of the requested and the nearest path, and
+  /// between the headings at their ends. With `exact_only`: only the latter. >= 0.
   double turn_rad = 0.0;
-  StepMeasures requested;     ///< The request relative to the fixed foot or to the start.
-  StepMeasures reached;       ///< The nearest step or jump.
+  /// Measures of the request, relative to the fixed foot (step) or to the start (jump).
+  StepMeasures requested;
+  StepMeasures reached;       ///< Measures of the nearest step or jump.
   bool is_footprint = false;  ///< The request was a step to a footprint.
 };
 
@@ -97,8 +98,8 @@ struct AvatarEvent {
   /// End of a walk (kFinished or kRejected): its mean speed without the first three and the last
   /// two steps. 0 if the walk had fewer than six steps.
   double speed_m_s = 0.0;
-  /// How the request ended. Every accepted request has exactly one event in which it is not kNone.
-  /// This is the last event with the id of the request.
+  /// How the request ended. For every accepted request, exactly one event has an outcome other than
+  /// kNone. This is the last event with the id of the request.
   RequestOutcome outcome = RequestOutcome::kNone;
 };
 
@@ -132,7 +133,7 @@ struct AvatarOptions {
   /// True: the duration and the pose of steps vary slightly, like the steps of people. Steps meet
   /// their parameters and footprints as accurately as without variation. Steps with `exact_only` do
   /// not vary. The default is false, because each avatar needs a different `seed`. The server and
-  /// `synthesize` set both.
+  /// the command `synthesize` set both options.
   bool stride_variation = false;
   /// Determines the starting point in the loop of the idle motion, and the variation of steps, so
   /// that avatars of a crowd do not move in unison.
@@ -216,9 +217,9 @@ class Avatar {
   std::unique_ptr<AvatarSimulation> simulation_;
 };
 
-/// Advances many avatars of one library together, which is several times as fast as one by one.
-/// Every pose has the same bytes as if its avatar had been advanced alone. Contains only scratch
-/// memory.
+/// Advances many avatars of one library together. This is several times as fast as advancing them
+/// one by one. Every pose has the same bytes as if its avatar had been advanced alone. The crowd
+/// contains only scratch memory, not the avatars.
 class AvatarCrowd {
  public:
   explicit AvatarCrowd(std::shared_ptr<const MotionLibrary> library);

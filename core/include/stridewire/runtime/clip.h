@@ -9,8 +9,8 @@
 
 namespace stridewire {
 
-/// Sampled motion M(t) = {t(t), r_j(t)}: root positions and joint rotations over time. The time of
-/// frame f is f / fps seconds.
+/// Sampled motion: the positions of the root and the rotations of all joints over time, M(t) in the
+/// paper. The time of frame f is f / fps seconds.
 struct Clip {
   double fps = 0.0;  ///< Frames per second, in (0, 10000].
   int joint_count = 0;
@@ -40,10 +40,10 @@ struct Clip {
                      kIdentityQuat);
   }
 
-  /// Errors: kOutOfRange if fps is not in (0, 10000] or there are no frames or no joints.
-  /// kShapeMismatch if the number of rotations is not frames times joints. kInvalidArgument, with
-  /// the frame as index, if a number is not finite or the length of a rotation differs from 1 by
-  /// more than 1e-3.
+  /// Checks the clip. Errors: kOutOfRange if fps is not in (0, 10000] or there are no frames or no
+  /// joints. kShapeMismatch if the number of rotations is not frames times joints.
+  /// kInvalidArgument, with the frame as index, if a number is not finite or the length of a
+  /// rotation differs from 1 by more than 1e-3.
   [[nodiscard]] Status Validate() const;
 };
 

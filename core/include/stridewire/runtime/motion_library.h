@@ -63,8 +63,8 @@ struct Parameter {
   ParameterName name = ParameterName::kStartZ;
   double min = 0.0;  ///< Minimum over the examples.
   double max = 0.0;  ///< Maximum over the examples.
-  /// Mean over the examples, which is subtracted before the linear part of the weights is
-  /// evaluated.
+  /// Mean over the examples. It is subtracted from the parameter before the linear part of the
+  /// weights is evaluated.
   double centre = 0.0;
   double scale = 1.0;  ///< Divisor of the values when distances are computed; > 0.
 };
@@ -120,7 +120,8 @@ inline constexpr std::string_view kCompletedSource = "completed";
 inline constexpr double kEaseOutS = 0.2;
 
 /// Examples that can be blended with each other. They have the same kind, parameters, number of
-/// keytimes and grid. All spans point into the bytes of the library.
+/// keytimes and grid. Keytimes are the times of corresponding events, such as toe-off and landing.
+/// All spans point into the bytes of the library.
 ///
 /// Sites are the points in parameter space where weights are prescribed: first the examples, then
 /// the pseudoexamples. n is the number of examples, m the number of sites and d the number of
@@ -142,7 +143,8 @@ struct MotionGroup {
   std::span<const double> radial;
   std::span<const int> cells;  ///< [interval]: number of grid cells of the keytime interval.
   int grid_point_count = 0;    ///< Sum of `cells`, plus 1.
-  std::span<const double> keytimes_s;  ///< [example][interval + 1]: keytimes, with K_0 = 0.
+  /// [example][interval + 1]: keytimes in seconds since the start. The first one is 0.
+  std::span<const double> keytimes_s;
   /// [example]: heading at the end, relative to the start.
   std::span<const double> heading_change_rad;
   /// [grid point][example][row_floats]: rows of the grid, 64-byte aligned.
@@ -198,7 +200,7 @@ class MotionLibrary {
   [[nodiscard]] std::span<const MotionGroup> groups() const {
     return std::span(groups_).first(file_group_count_);
   }
-  /// Returns a group of the file, or the settle or idle group.
+  /// Returns a group by its index: a group of the file, settle_group() or idle_group().
   [[nodiscard]] const MotionGroup& group(int index) const {
     return groups_[static_cast<std::size_t>(index)];
   }
@@ -207,7 +209,7 @@ class MotionLibrary {
   /// True if the library has motion for standing avatars. It is generated from the stand pose if
   /// feet can be planted (LegRig::is_usable).
   [[nodiscard]] bool has_stand_motion() const { return stand_motion_ != nullptr; }
-  /// Index of the group with the stand pose, into which avatars blend after their last step.
+  /// Index of the group that contains the stand pose. Avatars blend into it after their last step.
   [[nodiscard]] int settle_group() const { return static_cast<int>(file_group_count_); }
   /// Index of the group with the loop that standing avatars play.
   [[nodiscard]] int idle_group() const { return static_cast<int>(file_group_count_) + 1; }
@@ -215,11 +217,11 @@ class MotionLibrary {
   [[nodiscard]] std::span<const LayerClip> layers() const;
   /// Returns the index of the layer with this name, or -1.
   [[nodiscard]] int FindLayer(std::string_view name) const;
-  /// Transitions between movements as a table [from][to]. Each index is a group, or the number of
-  /// groups for the stand. Empty if the library file contains no transitions.
+  /// Transitions between movements as a table [from][to]. Each index is that of a group of the
+  /// file, or the number of these groups for the stand. Empty if the file contains no transitions.
   [[nodiscard]] std::span<const Transition> transitions() const;
-  /// Returns the transition between two groups, given by their indices. The index of the stand is
-  /// the number of groups. Returns null if the library file contains no transitions.
+  /// Returns an entry of transitions(): how well a movement of group `to` can follow one of group
+  /// `from`. Returns null if the file contains no transitions.
   [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const;
   /// Pose of an avatar that has just been spawned, relative to its base frame. The root is at
   /// x = z = 0 with heading 0, and y is above the ground.

@@ -23,7 +23,7 @@ struct BaseFrame {
 /// of the foot.
 struct Footprint {
   DVec3 position_m = DVec3(0.0);
-  /// Direction from heel to ball, minus the toe-out of that foot in the stand pose.
+  /// Direction from ankle to ball, minus the toe-out of that foot in the stand pose.
   double heading_rad = 0.0;
 };
 
@@ -37,17 +37,21 @@ struct FootprintRequest {
 /// Requests one step. The moving foot lands either relative to the fixed foot, or at a position in
 /// the world (`at`).
 struct StepRequest {
-  std::optional<Foot> foot;  ///< Moving foot. Default: the foot that did not move last.
-  double length_m = 0.0;     ///< Forward distance between the feet at the end; 0: side by side.
+  /// Moving foot. Default: while walking, the foot that did not move last; from a stand, the foot
+  /// that fits the request better.
+  std::optional<Foot> foot;
+  double length_m = 0.0;  ///< Forward distance between the feet at the end; 0: side by side.
   /// Sideways distance from the fixed to the moving foot, positive towards the side of the moving
-  /// foot.
+  /// foot. Default: the width of the library's steps.
   std::optional<double> side_m;
-  double height_m = 0.0;  ///< Height of the moving foot above the fixed foot at the end.
+  /// Height of the moving foot above the fixed foot at the end. Ignored if planted feet land on a
+  /// Terrain, which then determines the height.
+  double height_m = 0.0;
   double turn_rad = 0.0;  ///< Change of heading; positive turns left.
   /// Footprint of the moving foot in the world. It replaces length, side, height and turn.
   std::optional<FootprintRequest> at;
-  /// If the foot cannot land exactly at its place when the step is about to start, the request is
-  /// rejected. Requires foot planting.
+  /// True: the request is rejected at its start if the foot cannot land exactly at the requested
+  /// place. Requires foot planting.
   bool exact_only = false;
   /// True: the avatar plays the nearest step of the library, however far it is from the request.
   /// False: the step is rejected if its errors exceed kMaxRequestErrorM or kMaxRequestErrorRad.
@@ -76,7 +80,8 @@ struct WalkRequest {
   DVec3 position_m = DVec3(0.0);
   double heading_rad = 0.0;        ///< Heading of the base frame at the end.
   std::vector<DVec3> waypoints_m;  ///< Points to pass in this order; at most kMaxWaypoints.
-  /// Walking speed. It is met as closely as the library's steps allow (WalkSpeeds).
+  /// Walking speed. It is met as closely as the library's steps allow (WalkSpeeds). Default:
+  /// comfortable steps at a brisk pace.
   std::optional<double> speed_m_s;
 };
 
@@ -89,10 +94,10 @@ enum class Interrupt : std::uint8_t {
   /// The request begins at once if both feet stand, and otherwise as soon as they have landed. The
   /// queue is dropped.
   ///
-  /// The current step changes if enough of its swing remains (AvatarSimulation::kLeastSwingLeft).
-  /// If the request is a step of the swinging foot, or a walk that begins with one, the foot is
-  /// redirected to the new footprint. For a stand or jump, the step is shortened. If possible, the
-  /// shortened step brings the feet together.
+  /// The current step changes if more than 40 % of its swing remains. If the request is a step of
+  /// the swinging foot, or a walk that begins with one, the foot is redirected to the new
+  /// footprint. For a stand or jump, the step is shortened. If possible, the shortened step brings
+  /// the feet together.
   kNow,
 };
 
@@ -102,7 +107,7 @@ struct MovementRequest {
   Interrupt interrupt = Interrupt::kNone;
 };
 
-/// Starts, changes or ends a layer clip of the library, which plays over the movements.
+/// Starts, changes or ends a layer, a clip of the library that is played on top of movements.
 struct LayerRequest {
   int layer = 0;  ///< Index in MotionLibrary::layers().
   /// True starts or changes the layer. False ends it; weight and speed are then ignored.

@@ -20,7 +20,7 @@ struct ConstPoseSpan {
 struct PoseSpan {
   Vec3& root_position_m;
   std::span<Quat> rotations;
-  // NOLINTNEXTLINE(google-explicit-constructor): a view of a view.
+  // NOLINTNEXTLINE(google-explicit-constructor): PoseSpan is used where ConstPoseSpan is expected.
   operator ConstPoseSpan() const { return {root_position_m, rotations}; }
 };
 

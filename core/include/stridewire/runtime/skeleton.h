@@ -54,9 +54,10 @@ struct Skeleton {
   /// Returns the index of the joint with this name, or -1.
   [[nodiscard]] int FindJoint(std::string_view name) const;
 
-  /// Errors: kOutOfRange if there are no joints or more than kMaxJoints, if a joint precedes its
-  /// parent, or if a joint index of a leg is invalid. kInvalidArgument if an offset is not finite,
-  /// or a name is empty or a duplicate.
+  /// Checks the skeleton. Errors: kOutOfRange if there are no joints or more than kMaxJoints, if a
+  /// joint precedes its parent, or if a leg or an end site refers to a joint that does not exist.
+  /// kInvalidArgument if an offset is not finite or a coordinate of it exceeds kMaxOffsetM, or if a
+  /// name is empty or a duplicate.
   [[nodiscard]] Status Validate() const;
 };
 

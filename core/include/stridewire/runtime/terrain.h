@@ -21,8 +21,8 @@ inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Maximum magnitude of a g
 inline constexpr double kMinTerrainCellM = 0.01;
 inline constexpr double kMaxTerrainCellM = 1e3;
 inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Maximum magnitude of each coordinate.
-/// Maximum number of boxes that intersect one cell of the terrain's spatial index, which bounds the
-/// time of a query. Only terrains in which hundreds of boxes overlap exceed it.
+/// Maximum number of boxes that intersect one cell of the terrain's spatial index. The limit bounds
+/// the time of a query. Only terrains in which hundreds of boxes overlap exceed it.
 inline constexpr std::size_t kMaxTerrainBoxesPerCell = 256;
 
 /// Horizontal position, in metres.
