@@ -111,7 +111,8 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
     if (!radius_factors.empty()) basis.dilations[j] *= radius_factors[j];
   }
 
-  // A a = D in the least-squares sense, then R r = D - A a.
+  // Solves A a = D in the least-squares sense and then R r = D - A a, where D (`wanted`) contains
+  // the prescribed weights at the sites.
   Matrix a_matrix(m, d + 1);
   Matrix wanted = Matrix::Zero(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
   for (std::size_t k = 0; k < m; ++k) {

@@ -15,7 +15,7 @@ namespace stridewire {
 /// is fitted by least squares, and radial functions correct the remaining error at every site:
 ///
 ///   w_i(p) = sum_l a_il A_l(p) + sum_j r_ij R_j(p),   A_0 = 1,  A_l = (p_l - centre_l) / scale_l
-///   R_j(p) = B(|p - p_j| / d_j),  d_j = distance from site j to the nearest other site
+///   R_j(p) = B(|p - p_j| / d_j),  d_j = dilation of site j
 ///
 /// The weights sum to 1 everywhere. At an example, its own weight is 1 and all others are 0.
 /// Elsewhere usually all weights are nonzero, because the linear part does not vanish.
@@ -25,7 +25,7 @@ struct CardinalBasis {
   std::vector<double> centres;    ///< [d]
   std::vector<double> scales;     ///< [d], > 0
   std::vector<double> sites;      ///< [site][d]: parameters of the sites, in metres and radians.
-  std::vector<double> dilations;  ///< [site]: radii d_j, in scaled parameters.
+  std::vector<double> dilations;  ///< [site]: d_j in scaled parameters (CardinalBasisFit::Run).
   std::vector<double> linear;     ///< [1 + d][n]
   std::vector<double> radial;     ///< [site][n]
   double condition = 1.0;         ///< Condition number of R, estimated in the 1-norm.
@@ -38,10 +38,10 @@ struct ConstBasisSpan {
 
 /// Minimum distance between two sites after scaling. Callers must merge closer sites.
 inline constexpr double kMinSiteDistance = 1e-4;
-/// Run fails if the condition number of R is larger.
+/// CardinalBasisFit::Run fails if the condition number of R is larger.
 inline constexpr double kMaxCondition = 1e6;
 
-/// A job that fits a CardinalBasis to examples and pseudoexamples. Borrows its spans.
+/// Input for fitting a CardinalBasis to examples and pseudoexamples (Run). Borrows its spans.
 struct CardinalBasisFit {
   int parameter_count = 0;
   int example_count = 0;
@@ -60,9 +60,9 @@ struct CardinalBasisFit {
   /// The centre of a parameter is its mean over the *examples*. Parameters are centred so that the
   /// weights sum to 1 away from the sites even if the examples do not span all parameters. The
   /// dilation of an example is the distance to the nearest other example, that of a pseudoexample
-  /// the distance to the nearest site. Otherwise refinement, which adds pseudoexamples, would
-  /// shrink every radius. The least-squares solution has minimum norm; directions with a relative
-  /// weight below 1e-9 are ignored.
+  /// the distance to the nearest site. If examples used the nearest site as well, every added
+  /// pseudoexample would shrink their radii. The least-squares solution has minimum norm;
+  /// directions with a relative weight below 1e-9 are ignored.
   ///
   /// Errors: kShapeMismatch if the sizes of the spans do not match. kOutOfRange if a number is not
   /// finite, or if a scale or radius factor is not positive. kIllConditioned if two sites are

@@ -21,7 +21,8 @@ namespace stridewire {
 namespace {
 
 constexpr int kMaxRounds = 200;
-// Number of vertices that are stored. Larger groups are rare.
+// Maximum number of vertices that are stored. In larger groups, which are rare, the other vertices
+// are computed again whenever they are needed.
 constexpr std::size_t kMaxStoredVertices = 256;
 constexpr double kInside = 1e-9;
 
@@ -102,9 +103,8 @@ double Project(std::span<const double> points, std::span<const double> metric, d
   }
   Point<D> mean{};
   for (std::size_t l = 0; l < D; ++l) mean[l] = sum[l] / static_cast<double>(count);
-  // Vertices relative to the target, multiplied by the metric. The first ones are stored. The
-  // others are computed when they are needed, so that large groups need no more stack than small
-  // ones.
+  // Vertices of the enlarged hull, relative to the target and multiplied by the metric. Only the
+  // first ones are stored, so that large groups need no more stack than small ones.
   const auto compute_vertex = [&](std::size_t i) {
     Point<D> vertex{};
     for (std::size_t l = 0; l < D; ++l) {

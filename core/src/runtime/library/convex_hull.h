@@ -7,7 +7,7 @@ namespace stridewire {
 /// Finds the point closest to `target` [d] in the enlarged convex hull of `points` [count][d].
 ///
 /// The hull is scaled about the mean of the points: a `growth` of 0.1 moves every point 10 %
-/// further from the mean. Distances are measured after multiplying parameter l by `metric[l]`.
+/// further from the mean. Distances are measured after multiplying coordinate l by `metric[l]`.
 /// Writes the point to `nearest` [d] and returns its distance from `target`, which is 0 inside the
 /// hull.
 ///

@@ -120,8 +120,8 @@ double TimeWarp::GridPosition(double time_s) const {
   const double h = piece.end_s - piece.begin_s;
   const double s = (time_s - piece.begin_s) / h;
   const double rise = piece.end - piece.begin;
-  // Cubic Hermite interpolation relative to the start of the piece, which keeps small steps
-  // precise.
+  // Cubic Hermite interpolation, relative to the start of the piece so that short times after it
+  // remain precise.
   const double m0 = piece.begin_slope * h;
   const double m1 = piece.end_slope * h;
   const double value =
@@ -137,7 +137,7 @@ double TimeWarp::TimeAt(double grid_position) const {
     if (grid_position == knots_[i].position) return knots_[i].time_s;
   }
   // Newton's method usually finds the time with an error below kErrorS. In this case, the bisection
-  // evaluates the map only within kErrorS of the found time, and elsewhere only compares times.
+  // below evaluates GridPosition only within kErrorS of that time, and elsewhere compares times.
   constexpr double kErrorS = 1e-9;
   std::size_t i = 0;
   while (knots_[i + 1].position < grid_position) ++i;

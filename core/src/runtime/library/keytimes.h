@@ -12,9 +12,9 @@ inline constexpr int kMaxIntervals = 8;  ///< Maximum number of keytime interval
 /// Minimum length of a keytime interval in seconds. A library with a shorter interval is rejected.
 inline constexpr double kMinIntervalS = 1e-3;
 
-/// Errors: kOutOfRange if there are fewer than 2 or more than kMaxIntervals + 1 keytimes, the first
-/// is not 0, an interval is shorter than kMinIntervalS (index: the interval), or a number is not
-/// finite.
+/// Checks the keytimes of a movement. Fails with kOutOfRange if there are fewer than 2 or more than
+/// kMaxIntervals + 1 keytimes, the first is not 0, an interval is shorter than kMinIntervalS
+/// (index: the interval), or a number is not finite.
 [[nodiscard]] Status ValidateKeytimes(std::span<const double> keytimes_s);
 
 /// Generic time, paper Eq. (3): g(t) = i + (t - K_i) / (K_{i+1} - K_i) for K_i <= t < K_{i+1}. t is
@@ -30,11 +30,11 @@ inline constexpr double kMinIntervalS = 1e-3;
 inline constexpr double kShortestInterval = 0.75;
 inline constexpr double kLongestInterval = 4.0 / 3.0;
 
-/// Blends keytimes (paper, Eq. (4)). Blends the *lengths* of intervals and clamps each as above,
-/// because weights may be negative. Without the clamp, sum w K would not always increase outside
-/// the hull. Even inside the hull, an interval could shrink much more than the motion in it, which
-/// would then be too fast: by 2.7 cm per 60 Hz frame for steps of 0.64 to 0.76 m of captured
-/// subject 16.
+/// Blends keytimes (paper, Eq. (4)). Blends the *lengths* of intervals and clamps each length to
+/// kShortestInterval and kLongestInterval, because weights may be negative. Without the clamp, the
+/// keytimes sum w K would not always increase outside the hull. Even inside the hull, an interval
+/// could shrink much more than the motion in it, which would then be too fast: by 2.7 cm per 60 Hz
+/// frame for steps of 0.64 to 0.76 m of CMU subject 16.
 ///
 /// `example_keytimes_s` is [example][interval_count + 1] and `out_s` is [interval_count + 1]. The
 /// weights must sum to 1, and K_0 = 0.
@@ -57,7 +57,7 @@ class TimeWarp {
   [[nodiscard]] double GridPosition(double time_s) const;
   /// Inverts GridPosition, by bisection to 1e-12 s. Too slow for use in every tick.
   [[nodiscard]] double TimeAt(double grid_position) const;
-  /// Returns the generic time at `time_s`: GridPosition in units of keytime intervals.
+  /// Returns the generic time at `time_s`: GridPosition, converted to keytime intervals.
   [[nodiscard]] double GenericTimeAt(double time_s) const;
 
   [[nodiscard]] int interval_count() const { return interval_count_; }
@@ -83,7 +83,7 @@ class TimeWarp {
   }
 
  private:
-  // Stored together, so that a tick reads few cache lines.
+  // The numbers of a knot are stored together, so that a tick reads few cache lines.
   struct Knot {
     double time_s = 0.0;
     double position = 0.0;

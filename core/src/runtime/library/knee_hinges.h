@@ -24,7 +24,7 @@ class MotionLibrary;
 /// is not a chain of hip, knee and ankle.
 [[nodiscard]] std::array<Vec3, 2> LearnKneeHinges(const MotionLibrary& library);
 
-/// Computes the hinges from the frames of clips, before there is a library.
+/// Computes the hinges from the frames of clips, for use before a library has been built.
 [[nodiscard]] std::array<Vec3, 2> LearnKneeHinges(const Skeleton& skeleton,
                                                   ConstPoseSpan stand_pose,
                                                   std::span<const Clip* const> clips);

@@ -23,7 +23,7 @@ constexpr double kMaxComfortableM = 0.62;
 constexpr double kStrideM = 0.3;
 constexpr double kStraightRad = 0.2;
 constexpr double kLeastWidthM = 0.08;
-// Examples whose feet differ by at most this height are level.
+// Examples whose feet differ in height by at most this are level.
 constexpr double kLevelM = 0.05;
 
 // Ranges of the level steps of a library.

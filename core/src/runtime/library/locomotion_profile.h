@@ -9,8 +9,8 @@ namespace stridewire {
 
 class MotionLibrary;
 
-/// Feet are apart if the forward distance between them exceeds that of the stand pose by more than
-/// this.
+/// The feet of an avatar are apart if the forward distance between them differs from that of the
+/// stand pose by more than this.
 inline constexpr double kFeetApartForwardM = 0.12;
 
 /// Typical steps of a library, derived from its examples. Walks use them unless the request
@@ -26,8 +26,8 @@ struct LocomotionProfile {
   double stand_m = 0.2;   ///< Sideways distance between the feet in the stand pose.
   /// [foot]: position of the foot in the stand pose, relative to the base frame.
   std::array<DVec3, 2> stand_feet_m{};
-  /// True if one foot of the stand pose is more than 0.12 m ahead of the other, because the
-  /// captures contain no stand. A walk then begins and ends in a stride.
+  /// True if one foot of the stand pose is more than kFeetApartForwardM ahead of the other, because
+  /// the captures contain no stand. A walk then begins and ends in a stride.
   bool stands_in_stride = false;
   bool has_climbs = false;  ///< True if a group of steps has the parameter end_y.
 

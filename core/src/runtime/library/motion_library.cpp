@@ -33,8 +33,8 @@ constexpr std::size_t kAlignment = 64;
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
-// The following limits are far beyond human movements. Larger values would lose too much precision
-// as floats.
+// The limits from here to kMaxRadiusFactor are far beyond human movements. Larger values would lose
+// too much precision as floats.
 //
 // Maximum absolute value of a parameter, in metres or radians.
 constexpr double kMaxParameter = 100.0;
@@ -46,7 +46,7 @@ constexpr double kMinScale = 1e-7;
 constexpr double kMaxRadiusFactor = 100.0;
 
 // The weights must stay bounded up to this distance outside the range of each parameter, as a
-// fraction of the range. Requests are clamped to 10 % outside, so there is a margin.
+// fraction of the range. Requests are clamped to the hull enlarged by 10 %, so there is a margin.
 constexpr double kReach = 0.5;
 // Limit on the sum of |w|. It is compared with an upper bound that increases with the number of
 // examples. For 70 captured steps with five parameters, the bound is 230, while the real sum stays
@@ -145,7 +145,8 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
 }
 
 // Checks that all sites are inside the ranges of their parameters. Requests are clamped to the hull
-// of the sites, and are then within the bounds that CheckWeightTables verifies.
+// of the sites, so the bounds on weights that CheckWeightTables verifies for these ranges hold for
+// every request.
 Status CheckSites(const MotionGroup& group) {
   const std::size_t d = group.parameters.size();
   for (std::size_t l = 0; l < d; ++l) {

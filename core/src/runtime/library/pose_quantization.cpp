@@ -16,8 +16,8 @@ constexpr double kMargin = 0.12;
 // Replaces kMargin for hips, knees and ankles, because foot planting rotates them. On uneven
 // ground, with short legs and in redirected swings, they rotate further than in the examples.
 constexpr double kPlantedMargin = 0.3;
-// A component that varies by less than kStillWidth counts as constant. Its margin only has to cover
-// the quantization errors of the joints above it.
+// A component that varies by less than kStillWidth counts as constant. Its margin, kStillMargin,
+// only has to cover the quantization errors of the joints above it.
 constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
 // Margin for the rotations of standing avatars, which play their loop unchanged. It only has to
@@ -129,7 +129,7 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
       least_w_of(std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
                  (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + base_margin));
 
-  // In idle motion, standing avatars rotate joints that do not move in any example.
+  // The idle motion of standing avatars rotates joints that do not move in any example.
   if (!library.has_stand_motion()) return range;
   ForEachRotation(library, library.group(library.idle_group()), joint, [&](const DQuat& q) {
     const DQuat d = back * q;
@@ -145,7 +145,7 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
 }
 
 // Distributes bits over the components of all joints. Each bit goes to the component for which it
-// reduces the error of the least accurate point most.
+// most reduces the error of the least accurate joint or end site.
 class BitAllocator {
  public:
   BitAllocator(const Skeleton& skeleton, std::span<const RotationRange> ranges, double max_error_m)

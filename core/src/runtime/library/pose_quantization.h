@@ -40,8 +40,8 @@ struct PoseQuantization {
 /// of those above it. The angular error of a joint then moves only its own bone, and the total
 /// error is bounded by the sum of bone length times angle over a chain. No angle has an error of
 /// more than 0.23 degrees. `largest_error_m` of the result exceeds the requested one only if all
-/// joints have the maximum number of bits, which requires bones of many metres. `ranges` has one
-/// entry per joint. The result is the same on every machine.
+/// joints have the maximum number of bits. This happens only with bones of many metres. `ranges`
+/// has one entry per joint. The result is the same on every machine.
 [[nodiscard]] PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton,
                                                       std::span<const RotationRange> ranges,
                                                       double largest_error_m);

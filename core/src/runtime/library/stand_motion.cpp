@@ -26,7 +26,8 @@ constexpr double kIdleEaseS = 2.0;
 constexpr double kIdleTailS = 2.0;
 static_assert(kIdleTailS >= kIdleEaseS);
 constexpr int kSettleCells = 4;
-// Sufficient for sway of 0.5 Hz. Between grid points, the soles move by less than 0.01 mm.
+// Grid cells per second of the idle motion. They suffice for sway of 0.5 Hz: between grid points,
+// the soles move by less than 0.01 mm.
 constexpr int kIdleCellsPerS = 8;
 
 // Amplitudes of the sway of the pelvis and of breathing. When a person stands quietly, the pelvis
@@ -45,8 +46,8 @@ constexpr double kHeadYawRad = 3.0 * kRadPerDegree;
 constexpr double kHeadPitchRad = 1.0 * kRadPerDegree;
 constexpr double kArmRad = 0.8 * kRadPerDegree;
 
-// Maximum distance from hip to ankle: that of the stand pose, or this fraction of the leg length if
-// that is longer.
+// The idle motion does not extend a leg beyond this fraction of its length, or beyond its extension
+// in the stand pose if that is larger.
 constexpr double kExtension = 0.995;
 
 // A sum of sines with periods that divide kIdleLoopS.
@@ -161,9 +162,11 @@ Quat AxisRotation(const Vec3& axis, double angle_rad) {
   return {static_cast<float>(Cos(0.5 * angle_rad)), sine * axis.x, sine * axis.y, sine * axis.z};
 }
 
-const Vec3 kLeftAxis(1.0f, 0.0f, 0.0f);  // A positive rotation bends forward.
+// Axes of the world. A positive rotation about kLeftAxis bends the body forward, and a positive
+// rotation about kForwardAxis bends it to the right.
+const Vec3 kLeftAxis(1.0f, 0.0f, 0.0f);
 const Vec3 kUpAxis(0.0f, 1.0f, 0.0f);
-const Vec3 kForwardAxis(0.0f, 0.0f, 1.0f);  // A positive rotation bends to the right.
+const Vec3 kForwardAxis(0.0f, 0.0f, 1.0f);
 
 // Generates the idle motion around a stand pose.
 class IdleGenerator {
@@ -222,7 +225,8 @@ class IdleGenerator {
   }
 
  private:
-  // Rotates a joint about an axis of the world, starting from its orientation in the stand pose.
+  // Rotates a joint of pose_ about an axis of the world. Its parent is assumed to be oriented as in
+  // the stand pose.
   void Turn(std::size_t joint, const Vec3& axis, double angle_rad) {
     const Quat parent = joint == 0
                             ? kIdentityQuat
@@ -253,7 +257,7 @@ class IdleGenerator {
     Turn(0, kForwardAxis, lean_rad + tilt_rad);
     TurnAll(body_.spine, kForwardAxis, -0.9 * tilt_rad);
 
-    // 1 with full lungs, -1 with empty lungs. People exhale longer than they inhale.
+    // `breath` is 1 with full lungs and -1 with empty lungs. People exhale longer than they inhale.
     const double breath_rad = kTwoPi * kBreathsPerLoop / kIdleLoopS * time_s;
     const double breath = Sin(breath_rad + 0.35 * Sin(breath_rad));
     TurnAll(body_.spine, kLeftAxis, -kChestRad * breath);
@@ -300,7 +304,7 @@ class IdleGenerator {
   double hip_height_m_ = 1.0;
   double shift_m_ = 0.0;
   double drop_m_ = 0.0;
-  // Frequencies in multiples of 1 / 40 Hz.
+  // The arguments are a range of frequencies, as multiples of 1 / kIdleLoopS, and a seed.
   Harmonics sway_forward_{8, 20, 1};
   Harmonics sway_sideways_{8, 20, 2};
   Harmonics head_yaw_{2, 7, 3};

@@ -7,16 +7,16 @@
 
 namespace stridewire {
 
-/// The path of one foot through a movement, as corrections relative to the blended pose. b(t) is
-/// the ball of the foot in the blended pose with the difference pose, in world space.
+/// The path of one foot through a movement, as corrections that planting adds to the blended pose.
+/// b(t) is the ball of the foot in the blended pose with the difference pose, in world space.
 ///
 ///   horizontal: t <= release: from - b(t), so that the ball stands still at `from`;
 ///               then a cubic that continues with the same offset and velocity and ends at
 ///               t >= land: to - b(t)
 ///   heading:    locked while the sole is on the ground; with the heel up it follows the blend
 ///   height:     follows the blend, plus corrections that ease from one value to the next, plus
-///               `level_m`. It is not locked (but see locks_height), because in captured libraries
-///               a lock would bend knees by 25 degrees
+///               `level_m`. It is locked only if `locks_height`, because in captured libraries a
+///               lock would bend knees by 25 degrees
 struct FootTrajectory {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -24,38 +24,39 @@ struct FootTrajectory {
   Footprint to;    ///< Footprint at the end.
   /// Time at which the foot leaves `from`. kNever: it stands throughout the movement.
   double release_s = kNever;
-  double land_s = kNever;  ///< Time at which the foot comes to rest on `to`.
-  DVec3 release_offset_m = DVec3(0.0);
+  double land_s = kNever;               ///< Time at which the foot comes to rest on `to`.
+  DVec3 release_offset_m = DVec3(0.0);  ///< Offset of the ball from b(t) at release.
   /// Turn that the heading lock adds to the heading of the foot at release.
   double release_turn_rad = 0.0;
   DVec3 release_velocity_m_s = DVec3(0.0);  ///< Velocity of the offset at release.
-  DVec3 land_offset_m = DVec3(0.0);
-  DVec3 land_velocity_m_s = DVec3(0.0);
+  DVec3 land_offset_m = DVec3(0.0);         ///< Offset of the ball from b(t) at landing.
+  DVec3 land_velocity_m_s = DVec3(0.0);     ///< Velocity of the offset at landing.
   // Corrections of the height and heading of the blended foot: at t = 0, after the difference pose
   // has faded out, and from landing on. If `locks_height`, heights of the ball above the footprint.
   std::array<double, 3> height_m{};
   std::array<double, 3> turn_rad{};
-  /// Coefficients of u, u^2, u^3 and u^4 of an additional height, where u is the elapsed fraction
-  /// of the movement. It keeps the sole of a step's supporting foot on the ground.
+  /// An additional height that keeps the sole of a step's supporting foot on the ground:
+  /// coefficients of u, u^2, u^3 and u^4, where u is the elapsed fraction of the movement.
   std::array<double, 4> level_m{};
-  /// Maximum of another additional height while the difference pose fades out. Without it the foot
-  /// would sink, because the rotations of the legs and the height of the root fade differently.
+  /// Peak of an additional height while the difference pose fades out. Without it the foot would
+  /// sink, because the rotations of the legs and the height of the root fade differently.
   double settle_lift_m = 0.0;
-  /// True if the height of the ball is locked as well. A standing avatar needs this, because its
-  /// legs straighten while its feet must stay on the ground.
+  /// True if the height of the ball is locked to the footprint as well. A standing avatar needs
+  /// this, because its legs straighten while its feet must stay on the ground.
   bool locks_height = false;
   /// Ground normals at `from` and `to`.
   std::array<Vec3, 2> normals{Vec3(0.0f, 1.0f, 0.0f), Vec3(0.0f, 1.0f, 0.0f)};
-  /// Additional heights early, in the middle and late in the swing, which clear the ground. Each is
-  /// the peak of a curve that fades in and out (LiftShare). The middle one may be negative.
+  /// Additional heights early, in the middle and late in the swing, so that the foot clears the
+  /// ground. Each is the peak of a curve that fades in and out (LiftShare). The middle one may be
+  /// negative.
   std::array<double, 3> lift_m{};
   /// Horizontal offset in the middle of the swing, for passing the other foot and the edges of
   /// treads.
   DVec3 mid_swing_offset_m = DVec3(0.0);
-  /// Fraction of the foot's correction by which the root moves. The fractions of both feet sum to
-  /// 1.
+  /// Fraction of the foot's correction by which the root moves as well. The fractions of both feet
+  /// sum to 1.
   double root_weight = 0.0;
-  /// Shift of the root that is complete at the end of the movement.
+  /// Additional shift of the root. It increases over the movement and is complete at its end.
   DVec3 root_shift_m = DVec3(0.0);
 
   [[nodiscard]] bool IsPlanted(double time_s) const {
@@ -63,8 +64,8 @@ struct FootTrajectory {
   }
 };
 
-/// Difference between the previous foot correction and that of the plan at the start of a movement,
-/// and its velocity. It fades to zero, so that feet do not jump.
+/// Difference between the foot corrections of the previous movement and of a new plan, at the start
+/// of the new movement, and its velocity. It fades to zero, so that feet do not jump.
 struct FootResidual {
   DVec3 offset_m = DVec3(0.0);
   DVec3 offset_m_s = DVec3(0.0);
@@ -73,10 +74,10 @@ struct FootResidual {
   double over_s = 0.2;  ///< Time after which the residual is zero.
 };
 
-/// Additional horizontal motion of the root, which approaches its planned place above the standing
-/// feet over `over_s`. Without it, the rotations of the legs would move the root there while the
+/// Additional motion of the root, so that it approaches its planned place above the standing feet
+/// over `over_s`. Without it, the rotations of the legs would move the root there while the
 /// difference pose fades out. This is too abrupt if the place is far away or if the root moves at
-/// another speed.
+/// another speed. The motion is horizontal, except where the root rises on terrain.
 struct RootApproach {
   DVec3 offset_m = DVec3(0.0);    ///< Displacement of the root due to the rotations of the legs.
   DVec3 offset_m_s = DVec3(0.0);  ///< Velocity of this displacement at the start of the movement.
@@ -85,8 +86,8 @@ struct RootApproach {
 };
 
 /// A foot plan in the layout that the planting kernels read: groups of four floats, with positions
-/// relative to the base of the movement. Contains two trajectories and their common part
-/// (PackFootPlan).
+/// relative to the base of the movement. PackFootPlan writes the trajectories of both feet and then
+/// the data that both have in common.
 inline constexpr std::size_t kPackedTrajectoryFloats = 60;
 inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 20;
 using PackedFootPlan = std::array<float, kPackedPlanFloats>;
@@ -103,8 +104,8 @@ struct FootPlan {
 
   std::array<FootTrajectory, 2> feet;     ///< [foot]
   std::array<FootResidual, 2> residuals;  ///< [foot]
-  /// Residual of the root. It is separate from those of the feet, because the root may have
-  /// followed the other foot before.
+  /// Residual of the root, as in FootResidual. It is separate from those of the feet, because the
+  /// root may have followed the other foot before.
   DVec3 root_residual_m = DVec3(0.0);
   DVec3 root_residual_m_s = DVec3(0.0);
   RootApproach root_approach;

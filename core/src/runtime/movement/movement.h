@@ -29,8 +29,8 @@ struct PoseVelocity {
   std::vector<Vec3> joints_rad_s;
 };
 
-/// One synthesized movement. While it lasts, the displayed pose without layers follows from this
-/// value, its group and the time.
+/// One synthesized movement. While it lasts, this value, its group and the time determine the
+/// displayed pose without layers.
 struct Movement {
   // The members that are read for each pose come first, in few cache lines.
   int group = -1;
@@ -38,13 +38,16 @@ struct Movement {
   BaseFrame base;
   /// Turn in addition to that of the examples, eased over the movement.
   double extra_turn_rad = 0.0;
-  /// Time in the movement at which it begins. Above 0 if it continues a redirected swing, if it is
-  /// a jump that interrupts another movement, and for idle motion.
+  /// Time at which the avatar enters the movement, in seconds since its first keytime. Above 0 if
+  /// it continues a redirected swing, if it is a jump that interrupts another movement, and for
+  /// idle motion.
   double start_offset_s = 0.0;
-  double ease_out_s = kEaseOutS;     ///< T = min(MotionGroup::ease_out_s, duration).
-  double rate = 1.0;                 ///< Playback speed relative to the examples, > 0.
-  std::vector<float> weights;        ///< [example]: blend weights, whose sum is 1.
-  Pose difference;                   ///< D = P - M(start_offset_s), in world space.
+  double ease_out_s = kEaseOutS;  ///< Seconds over which the difference pose fades out (T).
+  double rate = 1.0;              ///< Playback speed relative to the examples, > 0.
+  std::vector<float> weights;     ///< [example]: blend weights, whose sum is 1.
+  /// Difference pose D = P - M in world space. P is the last pose of the previous movement, without
+  /// planting if the feet are planted. M is the blended pose of this movement at start_offset_s.
+  Pose difference;
   PoseVelocity difference_velocity;  ///< Velocity of D at start_offset_s.
   TimeWarp warp;                     ///< Time warp of the blended keytimes.
   /// Plan of the feet. If it is not active, feet follow the blended pose.
@@ -57,9 +60,9 @@ struct Movement {
   [[nodiscard]] double duration_s() const { return warp.duration_s(); }
 };
 
-/// Sets weights (Section 3), keytimes (Eq. (4)) and ease-out time of `movement` for a group,
-/// parameters [d] and a base frame. Does not set a difference pose. Reuses the memory of the
-/// vectors in `movement`.
+/// Sets the weights (paper, Section 3), the keytimes (Eq. (4)) and the ease-out time of `movement`
+/// for a group, parameters [d] and a base frame. Does not set a difference pose. Reuses the memory
+/// of the vectors in `movement`.
 void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
                    const BaseFrame& base, std::span<double> weight_scratch, Movement& movement);
 
@@ -76,7 +79,8 @@ void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Mov
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement,
                    double rate = 1.0);
 
-/// f(s) = 3(1-s)^2 - 2(1-s)^3: 1 for s <= 0, 0 for s >= 1.
+/// Returns f(s) = 3(1-s)^2 - 2(1-s)^3, the remaining fraction of a difference pose. It is 1 for
+/// s <= 0 and 0 for s >= 1.
 [[nodiscard]] inline double EaseOut(double s) {
   if (s <= 0.0) return 1.0;
   if (s >= 1.0) return 0.0;
@@ -84,16 +88,16 @@ void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& mo
   return r * r * (3.0 - 2.0 * r);
 }
 
-/// h(s) = s (1-s)^2: zero at both ends, with slope 1 at 0. Together with f it forms the cubic that
-/// has any given value and slope at 0 and ends at rest.
+/// Returns h(s) = s (1-s)^2, which is zero at both ends and has slope 1 at 0. Together with f(s) of
+/// EaseOut, it forms a cubic that has any given value and slope at 0 and ends at rest.
 [[nodiscard]] inline double EaseOutSlope(double s) {
   if (s <= 0.0 || s >= 1.0) return 0.0;
   return s * (1.0 - s) * (1.0 - s);
 }
 
 /// Returns the base frame after the movement: below the displayed root at its end, with the heading
-/// turned by the blended change. The paper uses the displayed heading instead. It oscillates with
-/// the pelvis, so walks would drift.
+/// turned by the blended change. The paper uses the displayed heading instead. That heading
+/// oscillates with the pelvis, so walks would drift.
 [[nodiscard]] BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose);
 
 }  // namespace stridewire

@@ -15,10 +15,10 @@ class StrideVariation {
   /// `movement_number` counts the movements of the avatar.
   StrideVariation(std::uint64_t seed, std::uint64_t movement_number);
 
-  /// Returns the factor for the playback speed of the step. Half of its deviation is random for
-  /// this step, and the other half is that of the previous step, because successive strides of
-  /// people are correlated (Hausdorff et al. 1995). The times of strides, which are two steps, then
-  /// vary by 1.3 %, like those of young adults (Hausdorff et al. 1996; decision 0041).
+  /// Returns the factor for the playback speed of the step. Its deviation from 1 is the mean of two
+  /// random values, one of this step and one of the previous step, because successive strides of
+  /// people are correlated (Hausdorff et al. 1995). The duration of a stride (two steps) then
+  /// varies by 1.3 %, as in young adults (Hausdorff et al. 1996; decision 0041).
   [[nodiscard]] double RateFactor() const;
 
   /// Returns a number in [-1, 1) for an example. These numbers form the direction in which the

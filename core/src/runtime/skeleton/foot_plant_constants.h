@@ -9,14 +9,14 @@ namespace stridewire {
 // that is longer. It never extends a leg beyond kLongestExtension of its length.
 inline constexpr double kEasyExtension = 0.995;
 inline constexpr double kLongestExtension = 0.9995;
-// Planting lowers the root if a leg would exceed that limit. A leg approaches the limit gradually.
-// It keeps its length up to kFreeExtension or, if longer, up to the extension of the blended pose.
-// The distance between that length and the limit is at least kLeastRoom. All are fractions of the
-// leg's length.
+// Planting lowers the root if a leg would exceed that limit. To avoid an abrupt start, it begins to
+// lower the root earlier: when the leg would be longer than kFreeExtension and longer than in the
+// blended pose, or when it is within kLeastRoom of the limit. All are fractions of the leg's
+// length.
 inline constexpr double kFreeExtension = 0.965;
 inline constexpr double kLeastRoom = 0.001;
-// If the legs require the root to be lowered by a and b, it is lowered by the larger value,
-// smoothed with kLowerOverlap * a * b.
+// If the legs require the root to be lowered by a and b, it is lowered by a smooth maximum of both,
+// (a + b + sqrt((a - b)^2 + kLowerOverlap a b)) / 2.
 inline constexpr double kLowerOverlap = 0.1;
 // Smoothing distances of SmoothMax. They prevent abrupt changes of speed of the root and the feet
 // when a limit becomes active.
@@ -26,9 +26,9 @@ inline constexpr double kSoftGroundM = 0.006;
 // ground plane. The lift fades to zero at kFarFromPrintM.
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
-// If planting lifts a sole out of the ground, the root rises as well, but by less than this. The
-// toes of a foot that pushes off may sink by almost 3 cm. If the body followed them, it would rise
-// and fall within 0.1 s. The knee of that leg bends more instead.
+// If planting lifts a sole out of the ground, the root rises as well, but by less than this. In the
+// blend, the toes of a foot that pushes off may sink by almost 3 cm. If the body followed their
+// lift, it would rise and fall within 0.1 s. The knee of that leg bends more instead.
 inline constexpr double kRootFollowsLiftM = 0.01;
 // During a swing, the ground plane that limits the foot changes from that of the old footprint to
 // that of the new one. The change begins at kGroundBlendStart and takes kGroundBlendLength, as
@@ -48,7 +48,8 @@ inline constexpr double kSwingTilt = 0.4;
 // Fraction of the swing at which its tilt begins to change to that of the footprint. The toes of a
 // landing foot are already raised, so the slope of a ramp is added late.
 inline constexpr double kLandingTiltStart = 0.75;
-// A curve that rises from 0 to 1, stays there and falls back to 0, at fractions of the swing.
+// A curve that rises from 0 to 1 between `begin` and `top`, and falls back to 0 between `falls` and
+// `end`. All are fractions of the swing.
 struct LiftCurve {
   double begin, top, falls, end;
 };
@@ -57,8 +58,8 @@ struct LiftCurve {
 // would lift it far too high.
 inline constexpr LiftCurve kLiftCurves[3] = {
     {0.0, 0.22, 0.22, 0.6}, {0.0, 0.35, 0.65, 1.0}, {0.4, 0.78, 0.78, 1.0}};
-// Flatness of a standing foot (LegPose::Flatness). Up to kHeelUp, the heading lock has no effect,
-// and from kSoleDown on it has its full effect.
+// The heading lock turns a standing foot to the heading of its footprint. Up to the flatness
+// kHeelUp (LegPose::Flatness) it has no effect, and from kSoleDown on it has its full effect.
 inline constexpr double kHeelUp = 0.5;
 inline constexpr double kSoleDown = 0.8;
 // Angle between the heading of a standing foot and that of its footprint. Up to kAheadRad, the
@@ -78,7 +79,7 @@ inline constexpr double kHeelRise = 1.6;
 inline constexpr double kAnkleLimitSine = 0.644217687237691;
 inline constexpr double kAnkleLimitCosine = 0.7648421872844885;
 
-// A leg with a shorter thigh or shank cannot be planted.
+// A leg whose thigh or shank is shorter than this cannot be planted.
 inline constexpr float kSmallestBoneM = 1e-3f;
 // The axis of a knee is the normal of the leg's plane if the sine of the knee's bend exceeds
 // kBentSine. A straighter knee has no reliable plane, so the knee's hinge (LegRig::Side::hinge) is

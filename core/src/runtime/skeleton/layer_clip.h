@@ -16,9 +16,9 @@ inline constexpr std::size_t kMaxLayerNameBytes = 32;
 inline constexpr double kMinLayerFps = 1.0;
 inline constexpr double kMaxLayerFps = 240.0;
 
-/// A clip for a part of the body that is played on top of any movement of the legs, for example
-/// waving or carrying. Its mask has one weight per joint. Joints that are not listed have weight 0.
-/// Spans point into the library's bytes.
+/// A clip for a part of the body, for example waving or carrying. It is played on top of movements
+/// of the legs. Its mask has one weight per joint. Joints that are not listed have weight 0. Spans
+/// point into the library's bytes.
 struct LayerClip {
   std::string_view name;  ///< Satisfies IsLayerName().
   /// Source of the clip, for example "wave.bvh 1.00-2.50 s".
@@ -26,7 +26,8 @@ struct LayerClip {
   double fps = 0.0;  ///< Keys per second, kMinLayerFps to kMaxLayerFps.
   /// True for a loop, in which the first key follows the last; false if the clip is played once.
   bool is_looping = false;
-  /// Joints that the clip animates, in increasing order. Neither the root nor a joint of a leg.
+  /// Indices of the joints that the clip animates, in increasing order. The root and the joints of
+  /// the legs are not among them.
   std::span<const int> joints;
   std::span<const float> weights;    ///< [index in joints]: weights in (0, 1].
   std::span<const float> rotations;  ///< [frame][index in joints][x, y, z, w]: local rotations.
@@ -44,8 +45,8 @@ struct LayerClip {
 /// '.'.
 [[nodiscard]] bool IsLayerName(std::string_view name);
 
-/// [joint]: true for joints that layers must not affect: the root, all joints between the root and
-/// the balls of the feet, and all joints below a hip.
+/// Returns a flag per joint: true if layers must not affect it. These joints are the root, all
+/// joints between the root and the balls of the feet, and all joints below a hip.
 [[nodiscard]] std::vector<bool> JointsOfLegs(const Skeleton& skeleton);
 
 }  // namespace stridewire

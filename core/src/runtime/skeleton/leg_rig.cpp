@@ -29,7 +29,7 @@ Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Vec3& reference) {
   const Vec3 plane = glm::cross(thigh, shank) / scale;
   const float sine = std::sqrt(glm::dot(plane, plane));
   const float s = std::clamp((kBentSine - sine) / (kBentSine - kStraightSine), 0.0f, 1.0f);
-  // A knee that is bent backward is treated as straight.
+  // If the knee is bent backward, its plane is ignored, and the axis is that of a straight knee.
   const float forward = glm::dot(plane, reference) < 0.0f ? 0.0f : 1.0f;
   const float weight = forward > 0.0f ? s * s * (3.0f - 2.0f * s) : 1.0f;
   return forward * plane + kReferenceWeight * weight * reference;

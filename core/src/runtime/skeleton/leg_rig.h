@@ -35,14 +35,14 @@ struct LegRig {
     double toe_m = 0.0;   ///< Horizontal distance from the ball to the toe tip.
     double foot_m = 0.0;  ///< Horizontal distance from the ankle to the ball in the stand pose.
     /// Cosine and sine of the angle between shank and foot at which the flexion of the ankle is
-    /// kAnkleLimitRad.
+    /// kAnkleLimitRad. A cosine of 2 disables this limit, for feet without a length.
     double ankle_limit_cosine = 2.0;
     double ankle_limit_sine = 1.0;
-    /// True if the last joint of the chain is the ball, and its parent the ankle: then the toes can
-    /// stay flat while the heel rises.
+    /// True if the last joint of the chain is the ball, and its parent is the ankle. The toes can
+    /// then stay flat while the heel rises.
     bool has_toe_joint = false;
   };
-  /// The data of a side and its offsets in flat arrays, for the planting kernels.
+  /// The data of a Side, and the offsets of its joints, in flat arrays for the planting kernels.
   struct Bones {
     std::size_t count = 0;               ///< Number of joints in the chain.
     std::size_t joints[kMaxLegChain]{};  ///< [index in chain]
@@ -71,8 +71,7 @@ struct LegRig {
   std::array<Side, 2> sides;   ///< [foot]
   std::array<Bones, 2> bones;  ///< [foot]: bones of the leg; set if the rig is usable.
   static constexpr std::size_t kMaxJointsOfLegs = 2 * kMaxLegChain - 1;
-  /// Joints of both chains in increasing order, which starts with the root. Set if the rig is
-  /// usable.
+  /// Joints of both chains in increasing order, beginning with the root. Set if the rig is usable.
   std::vector<int> joints;
   /// True if each leg is a chain of hip, knee, ankle and ball with bones of positive length.
   /// Otherwise, feet are not planted.
@@ -81,10 +80,10 @@ struct LegRig {
   [[nodiscard]] const Side& side(Foot foot) const { return sides[static_cast<std::size_t>(foot)]; }
 };
 
-/// Assumed distance of the heel behind the ankle. Skeletons have no heel joint.
+/// Assumed distance of the heel behind the ankle, because skeletons have no heel joint.
 inline constexpr double kSoleBehindAnkleM = 0.06;
 
-/// `knee_hinges` [foot]: see LegRig::Side::hinge.
+/// Computes the rig of a skeleton. `knee_hinges` has one LegRig::Side::hinge per foot.
 [[nodiscard]] LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose,
                                 const std::array<Vec3, 2>& knee_hinges);
 
@@ -102,9 +101,9 @@ struct LegPose {
   /// Returns the horizontal length of the foot as a fraction of that in the stand pose: 1 with the
   /// sole on the ground, less with the heel up, and 0 if the ball is at the ankle.
   [[nodiscard]] double Flatness(const LegRig::Side& side) const;
-  /// Returns the smallest difference, among ankle, ball and toe tip, between the height of the
-  /// point relative to the root and its height above the ground in the stand pose. The toe tip may
-  /// be a little lower.
+  /// Computes a difference for ankle, ball and toe tip: the height of the point relative to the
+  /// root, minus its height above the ground in the stand pose. Returns the smallest of the three.
+  /// For the toe tip, 5 mm are added first, because toes bend before they lift the foot.
   ///
   /// If the root is at height y, a foot that stands on level ground at height g has y + LowestSole
   /// = g, even while it rolls over the heel or the toes.

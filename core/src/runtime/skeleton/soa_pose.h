@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-/// Poses side by side, one per lane, in the layout that the SIMD kernels use.
+/// Up to kLanes poses side by side, one per lane, in the layout that the SIMD kernels use.
 class SoaPose {
  public:
   static constexpr std::size_t kLanes = 16;

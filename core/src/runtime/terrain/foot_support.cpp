@@ -38,7 +38,7 @@ class SolePoints {
   [[nodiscard]] auto end() const { return points_.end(); }
   [[nodiscard]] static constexpr int size() { return kRows * kColumns; }
 
-  // Marks the points that are connected to the ball by slopes within the limit. Passes over all
+  // Marks the points that are connected to the ball by slopes of at most kMaxSlope. Passes over all
   // points until nothing changes: twice on ordinary ground, and at most once per point.
   void Spread() {
     ball().is_reached = true;

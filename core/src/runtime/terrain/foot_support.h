@@ -20,7 +20,7 @@ struct FootSupport {
   double ground_height_m = 0.0;          ///< Terrain::HeightAt the ball.
   double gap_m = 0.0;    ///< Maximum depth of the ground below the plane within the sole, >= 0.
   double rise_m = 0.0;   ///< Maximum height of the ground above the plane within the sole, >= 0.
-  double carried = 1.0;  ///< Fraction of the sole, 0 to 1, that is above ground close to the plane.
+  double carried = 1.0;  ///< Fraction of the sole's points to which the plane is fitted, 0 to 1.
 };
 
 /// Computes the support of a foot whose ball is above (x, z) and whose heading is `heading_rad`.
@@ -28,8 +28,8 @@ struct FootSupport {
 /// least squares to the points that are connected to the ball without a rise or drop steeper than
 /// 45 degrees, with a tolerance of 5 mm. At an edge, the plane therefore stays on the ball's side:
 ///
-///          ball                 gap_m: the edge
-///   =========o==------          carried: 0.7 of the sole
+///          ball                 gap_m: height of the edge
+///   =========o==------          carried: 0.7
 ///   ~~~~~~~~~~~~|
 ///               |_________
 ///
