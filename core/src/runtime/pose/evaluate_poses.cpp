@@ -11,8 +11,8 @@
 namespace stridewire {
 namespace {
 
-// Limits on the speed of a difference pose, which are above all speeds of human bodies. The
-// overshoot of a blend is at most 4/27 of this speed times the length of the blend.
+// Limits on the speed of a difference pose. Human bodies do not move faster. The overshoot of a
+// blend is at most 4/27 of this speed times the duration of the blend.
 constexpr float kMaxJointRadPerS = 20.0f;
 constexpr float kMaxRootMPerS = 4.0f;
 
@@ -21,8 +21,8 @@ Vec3 NoFaster(const Vec3& velocity, float most) {
   return speed > most ? velocity * (most / speed) : velocity;
 }
 
-// Converts a small rotation to a rotation vector. The length is approximate (2 sin(angle / 2)),
-// which avoids trigonometry that differs between machines.
+// Converts a small rotation to a rotation vector. The length is only approximately the angle (2
+// sin(angle / 2)), but needs no trigonometry, which would differ between machines.
 Vec3 RotationVector(const Quat& q) {
   const float sign = q.w < 0.0f ? -2.0f : 2.0f;
   return sign * Vec3(q.x, q.y, q.z);
@@ -112,8 +112,8 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
   }
 }
 
-// Executes the operations of kernels::ComputeGridSamples for a single time, for which scalar code
-// is faster.
+// Performs the operations of kernels::ComputeGridSamples for a single time. For one time, scalar
+// code is faster.
 PoseSample SampleAt(const MotionGroup& group, const Movement& movement, double time_s) {
   const CellWeights cell =
       CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);
@@ -161,7 +161,8 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement) {
-  // A movement is extrapolated to times before its start by reflecting its first moments.
+  // The velocity requires the pose of the movement kBlendStepS before the blend begins. If there is
+  // none, the pose kBlendStepS later is reflected at the first pose.
   const bool is_reflected = movement.start_offset_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
                 movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache,

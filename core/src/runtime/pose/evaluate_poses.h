@@ -11,9 +11,9 @@
 
 namespace stridewire {
 
-/// Caches the weighted sums of the examples at grid points. A sum costs n multiply-adds per number,
-/// whereas poses between grid points are only interpolated. Results do not depend on the state of
-/// the cache. Takes 17 KB and never allocates.
+/// Caches the weighted sums of the examples of a movement at grid points. A sum over n examples
+/// costs n multiply-adds per number, whereas poses between grid points are only interpolated.
+/// Results do not depend on the state of the cache. It takes 17 KB and never allocates.
 class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
@@ -60,18 +60,21 @@ void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                    double time_s, GridCache& cache, PoseSpan out);
 
-/// Evaluates the pose with the difference pose (Eq. (5)): M'(t) = f(s) D + M(t) with s = (t -
-/// start_offset_s) / T. Therefore M'(start_offset_s) = P, and M'(t) = M(t) for s >= 1. If the
-/// movement is inertial, T h(s) V is added, where V is the velocity of the difference.
+/// Evaluates the pose with the difference pose D = Movement::difference (paper, Eq. (5)):
+///
+///   M'(t) = f(s) D + M(t),   s = (t - start_offset_s) / T,   T = ease_out_s,   f = EaseOut
+///
+/// At start_offset_s, this is the pose that the movement blends from. For s >= 1, it is M(t). If
+/// the movement is inertial, T h(s) V is added, where V is the velocity of D and h is EaseOutSlope.
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out);
 
 /// Time in seconds between the two poses from which a velocity is measured.
 inline constexpr double kBlendStepS = 0.004;
 
-/// Sets the velocity of a movement's difference pose. `before` is the previous movement's pose at
-/// the start of this one and `earlier` its pose kBlendStepS before that. `scratch` has one rotation
-/// per joint. Does not allocate if the velocity has room for all joints.
+/// Sets the velocity of a movement's difference pose. `before` is the pose of the previous movement
+/// at the start of this one, and `earlier` is its pose kBlendStepS before that. `scratch` has one
+/// rotation per joint. Does not allocate if the velocity has room for all joints.
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement);

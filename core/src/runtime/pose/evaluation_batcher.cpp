@@ -77,8 +77,9 @@ std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t 
   return std::span(order_).subspan(begin, end - begin);
 }
 
-// While one pose of a block is evaluated, prefetches a part of the data of the next two blocks: the
-// arrays to which the movements of the next block point, and the movements of the block after it.
+// Call it for each pose of a block. Each call prefetches a part of the data of the next two blocks:
+// the arrays to which the movements of the next block point, and the movements of the block after
+// it.
 void EvaluationBatcher::PrefetchNext(std::size_t end, int pose, int count) const {
   const std::size_t lanes = SoaPose::kLanes;
   const auto first = static_cast<std::size_t>(pose) * lanes / static_cast<std::size_t>(count);

@@ -10,7 +10,7 @@
 
 namespace stridewire {
 
-/// Returns the number of poses, 1 to `most`, before the end of a movement. The first pose is at
+/// Returns how many poses, 1 to `most`, fit before the end of a movement. The first pose is at
 /// `time_s`, and poses are `ticks_apart` ticks of `step_s` seconds apart.
 [[nodiscard]] int SampleRunCount(const Movement& movement, double time_s, double step_s,
                                  int ticks_apart, int most);

@@ -23,14 +23,15 @@ struct TrajectoryOf {
   Number locks_height;  // 1 if FootTrajectory::locks_height, else 0.
 };
 
-// The offset of a foot, and values from which its turn follows as well.
+// The offset of a foot, and intermediate values from which CorrectTrajectory computes the turn of
+// the foot.
 template <typename Number, typename Vector>
 struct OffsetOf {
   Vector offset;
-  Number swing;           // As in CorrectionOf.
+  Number swing;           // Elapsed fraction of the swing, as in CorrectionOf.
   Number settled;         // Fraction of the difference pose that has faded out.
   Number residual;        // Remaining fraction of the residual.
-  Number residual_slope;  // Factor in seconds of the velocity of the residual.
+  Number residual_slope;  // Time in seconds by which the velocity of the residual is multiplied.
 };
 
 template <typename Number, typename Vector>
@@ -73,7 +74,7 @@ STRIDEWIRE_INLINE Number ExtraTurnAt(const Timing& timing, Number at_s) {
   return timing.extra_turn * (Constant<Number>(1.0) - EaseOut(timing.OfDuration(at_s)));
 }
 
-// Returns the offset of a foot, which does not depend on the heading of the blended foot.
+// Returns the offset of a foot. It does not depend on the heading of the blended foot.
 template <typename Number, typename Vector, typename Timing>
 STRIDEWIRE_INLINE OffsetOf<Number, Vector> OffsetTrajectory(
     const Timing& timing, const TrajectoryOf<Number, Vector>& trajectory, const Vector& ball) {
@@ -87,7 +88,8 @@ STRIDEWIRE_INLINE OffsetOf<Number, Vector> OffsetTrajectory(
       Select(has_landed, one, Select(is_planted, zero, (t - trajectory.release_s) / length));
   const Number r = one - s;
 
-  // A planted ball stays on its footprint. A swinging one follows a cubic Hermite curve.
+  // The ball of a planted foot stays on its footprint. The offset of a swinging foot follows a
+  // cubic Hermite curve.
   const Vector print = Select(has_landed, trajectory.to, trajectory.from);
   const Number across = Constant<Number>(4.0) * s * r;
   const Vector flying =
@@ -152,9 +154,10 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
                  at.residual_slope * trajectory.residual_turn_s);
   c.free_turn = free;
 
-  // The heading of a standing foot is locked while its sole is on the ground, and free with the
-  // heel up. Seen from above, a foot on its toes is too short to have a heading. Once the ankle has
-  // passed the ball, the direction from ankle to ball is reversed, so it is not a heading either.
+  // The heading of a standing foot is locked while its sole is on the ground, and free when its
+  // heel is up. Seen from above, a foot on its toes is too short to have a heading. Once the ankle
+  // has passed the ball, the direction from ankle to ball is reversed, so it is not a heading
+  // either.
   const Number print_heading = Select(has_landed, trajectory.to_heading, trajectory.from_heading);
   const Number error = WrapAngle(print_heading - heading - free);
   const Number ahead =
@@ -187,8 +190,8 @@ STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timi
       EaseOut(since_s / Max(Constant<Number>(kRootShiftS), residual.approach_over_s));
   const Number rise = EaseOut(since_s / Max(Constant<Number>(kRootShiftS),
                                             Constant<Number>(kRootRisePart) * timing.duration_s));
-  // The difference pose already contributes the fraction `blended` of the approach, so only the
-  // difference from the wanted fraction `part` is added.
+  // The difference pose still displaces the root by the fraction `blended` of the approach. The
+  // displacement should be the fraction `part`, so only the difference of both is added.
   const Number faded = timing.OfEaseOut(since_s);
   const Number blended = EaseOut(faded);
   const Number blended_s = timing.ease_out_s * EaseOutSlope(faded);

@@ -1,5 +1,5 @@
 // Plants the feet of several avatars at once (see PlantFeet). A test compares the result with a
-// plain implementation in double precision, tests/support/reference_evaluation.cpp. Positions are
+// scalar implementation in double precision, tests/support/reference_evaluation.cpp. Positions are
 // relative to the base of each movement, so that single precision suffices.
 #if defined(STRIDEWIRE_FOOT_PLANT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_FOOT_PLANT_INL_H
@@ -113,17 +113,17 @@ struct SoaLeg {
 
 HWY_INLINE SoaVec3 Broadcast(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
-// Calls `step` for the left and then for the right leg. Each step of a leg depends on its previous
-// one. Because the steps of both legs alternate, the processor can work on one leg while it waits
-// for results of the other.
+// Calls `step` for the left and then for the right leg. Each step of a leg depends on the previous
+// step of that leg. Because the steps of both legs alternate, the processor can work on one leg
+// while it waits for results of the other.
 template <typename Step>
 HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[0], std::size_t{0});
   step(rig.bones[1], std::size_t{1});
 }
 
-// Maps positions in a leg's chain to joints in an array of rotations: those of the skeleton, or
-// only those of LegRig::joints.
+// Maps positions in a leg's chain to joints in an array of rotations. The array contains either all
+// joints of the skeleton, or only those in LegRig::joints.
 using JointMap = std::size_t (LegRig::Bones::*)[kMaxLegChain];
 
 HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, SoaQuat root, SoaLeg* legs,
@@ -294,7 +294,7 @@ HWY_INLINE void BendLegs(const LegRig& rig, const SoaLeg* legs, const FootTarget
 
 // Raises the heels of feet whose ankles would be flexed too far (kAnkleLimitRad): turns these feet
 // about their balls. Toes keep their rotation in the world if they have a joint. `share` scales the
-// turns. Returns whether any target has changed.
+// turns. Returns true if any target has changed.
 HWY_INLINE bool RaiseHeels(const LegRig& rig, const SoaBones* work, Float share,
                            FootTarget* targets, float* rotations, JointMap joints) {
   Float excess[2];
@@ -310,7 +310,7 @@ HWY_INLINE bool RaiseHeels(const LegRig& rig, const SoaBones* work, Float share,
     const Mask is_flexed = excess[f] > Float(0.0f);
     const Float soft = Min(excess[f], Float(static_cast<float>(kAnkleSoftRad)));
     const Float grown = excess[f] - soft + DivideBy(soft * soft, 2.0 * kAnkleSoftRad);
-    // The tangent of half the turn, which is close to half the turn.
+    // Half the turn, which is used as an approximation of its tangent.
     const Float half = Float(static_cast<float>(0.5 * kHeelRise)) * grown * share;
     const SoaVec3& sole = soles[f];
     const Float per_flat =
@@ -369,8 +369,9 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, Float heel_shar
   });
 }
 
-// Returns by how much the root must be lowered for a leg to reach its ankle target. `blended_m` is
-// the distance from hip to ankle in the blended pose, `reach` the vector from hip to target.
+// Returns by how much the root must be lowered for a leg to reach the target of its ankle, in
+// metres (see kFreeExtension). `blended_m` is the distance from hip to ankle in the blended pose,
+// and `reach` is the vector from the hip to the target.
 HWY_INLINE Float LowerFor(float length_m, Float blended_m, SoaVec3 reach) {
   const auto part = [&](double fraction)
                         HWY_ATTR { return Float(static_cast<float>(fraction) * length_m); };
@@ -463,8 +464,8 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
           (Float(1.0f) - second) *
               DepthBelow(trajectory.from, trajectory.normals[0], bones, leg, at, c.turn) +
           second * DepthBelow(trajectory.to, trajectory.normals[1], bones, leg, at, c.turn);
-      // The root follows this lift as it follows the other corrections of the foot, but a large
-      // lift bends the leg instead (kRootFollowsLiftM). The fractions for the two feet change
+      // The root follows this lift as it follows the other corrections of the foot, but only up to
+      // kRootFollowsLiftM. Beyond that, the lift bends the leg. The fraction for each foot changes
       // gradually, because the feet exchange their roles from step to step.
       const Float entered = common.OfEaseOut(common.time_s - common.start_offset_s);
       const Float share =

@@ -16,8 +16,8 @@ struct GridSample {
   std::array<float, 4> weights;  ///< Weight of each point.
 };
 
-/// Returns the index of point `k` of a sample. For points beyond the last grid point, returns the
-/// last point: their weight is zero, but the row is still read.
+/// Returns the index of point `k` of a sample. For a point beyond the last grid point, returns the
+/// last grid point. The weight of such a point is zero, but its row is read nevertheless.
 [[nodiscard]] inline int GridPointOf(const MotionGroup& group, const GridSample& sample, int k) {
   return std::min(sample.first_point + k, group.grid_point_count - 1);
 }
@@ -64,8 +64,8 @@ inline void BlendRow(const MotionGroup& group, const GridLayout& layout, const M
                        static_cast<std::size_t>(layout.row_floats), row);
 }
 
-/// Rotations that cancel each other out have no mean. Replaces such rotations of a blended row with
-/// those of the example with the largest weight.
+/// If the examples' rotations of a joint cancel each other out, they have no mean. Replaces such
+/// rotations of a blended row with those of the example with the largest weight.
 void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                        const GridSample& sample, float* row);
 

@@ -173,7 +173,7 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement) {
   // Maximum speed in m/s at which a standing foot continues to descend. A foot that was faster is
-  // slowed down to it, so that it does not sink into the ground.
+  // slowed down to this speed, so that it does not sink into the ground.
   constexpr double kMaxDescentSpeed = 0.5;
   FootPlan& plan = movement.feet;
   const double per_s = 1.0 / kBlendStepS;

@@ -8,10 +8,10 @@
 
 namespace stridewire {
 
-/// Time over which the residual of the root fades out.
+/// Time over which the residual of the root (FootPlan::root_residual_m) fades out, in seconds.
 inline constexpr double kRootShiftS = 0.25;
-/// The vertical residual fades over this fraction of the movement, if that is longer, because a
-/// body rises for as long as its leg extends.
+/// The vertical residual fades out over this fraction of the movement, if that is longer than
+/// kRootShiftS, because a body rises for as long as its leg extends.
 inline constexpr double kRootRisePart = 0.75;
 
 /// A foot in the blended pose, before planting.
@@ -27,7 +27,7 @@ using FeetAt = std::array<BlendedFoot, 2>;
 /// Correction of one foot at one time.
 struct FootCorrection {
   DVec3 offset_m = DVec3(0.0);
-  double turn_rad = 0.0;
+  double turn_rad = 0.0;       ///< Turn that is added to the heading of the blended foot.
   double free_turn_rad = 0.0;  ///< Turn that the foot would have without the heading lock.
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
   double root_weight = 0.0;
@@ -78,9 +78,9 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement);
 
-/// Starts a plant fade in a planned movement. `displayed` is the pose at its start, which has no
-/// planted feet and is also the blended pose at that time. `pose` is scratch memory of the same
-/// size.
+/// Starts to fade in the changes due to planting in a planned movement (FootPlan::plant_fade_s).
+/// `displayed` is the pose at its start, which has no planted feet and is also the blended pose at
+/// that time. `pose` is scratch memory of the same size.
 void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose);
 
 /// Final step of planting: adds the remaining part of the plant fade (FootPlan::plant_fade_s).

@@ -21,7 +21,7 @@ namespace stridewire::kernels::HWY_NAMESPACE {
 namespace {
 
 // Keeps a value in a register. Otherwise, g++ reads it from memory again for every multiplication,
-// and memory reads limit the kernel.
+// and memory reads limit the speed of the kernel.
 HWY_INLINE void StayInRegister([[maybe_unused]] hn::Vec<FloatTag>& x) {
 #if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL
   asm("" : "+v"(x.raw));
@@ -29,8 +29,8 @@ HWY_INLINE void StayInRegister([[maybe_unused]] hn::Vec<FloatTag>& x) {
 }
 
 // Computes a part of the blended rows of `Rows` movements: the `Vectors` SIMD vectors of each row
-// that start at offset `at`. The sums are independent, so their additions overlap. Each value that
-// is read from the library is used for all movements.
+// that start at offset `at`. The sums are independent, so the processor executes their additions in
+// parallel. Each value that is read from the library is used for all movements.
 template <std::size_t Rows, std::size_t Vectors>
 HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const* weights,
                            std::size_t count, std::size_t row_floats, float* const* rows,
@@ -149,8 +149,8 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   Mask is_short = {hn::FirstN(d, 0)};
   std::size_t next = 0;
   while (next < blend.joint_count) {
-    // If fewer joints remain than a vector holds, the last vector also repeats some earlier joints,
-    // with the same results. No vector is therefore partly empty.
+    // If fewer joints remain than a vector holds, the last vector begins with some joints of the
+    // previous one. It computes the same results for them again, so no vector is partly empty.
     const std::size_t j = next + width > blend.joint_count && blend.joint_count >= width
                               ? blend.joint_count - width
                               : next;

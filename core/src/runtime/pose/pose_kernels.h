@@ -18,11 +18,13 @@ namespace stridewire::kernels {
 /// Maximum number of movements per block. Rows have a multiple of this many floats.
 inline constexpr std::size_t kBlock = 16;
 
-/// row = sum of weights[e] * examples[e * row_floats ...] over `count` examples, in order.
+/// Computes the weighted sum of the rows of `count` examples, which are summed in order:
+/// row[i] = sum of weights[e] * examples[e * row_floats + i].
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
              float* row);
 
-/// row = sum of weights[k] * points[k] over four rows, in order.
+/// Computes the weighted sum of four rows, which are summed in order: row[i] = sum of weights[k] *
+/// points[k][i].
 void BlendPoints(const float* const points[4], const float weights[4], std::size_t row_floats,
                  float* row);
 
@@ -105,23 +107,25 @@ struct LayerBlend {
   std::size_t joint_count;
   float weight;  ///< Weight of the layer, in [0, 1]
 };
-/// Changes the rotation r of each of the layer's joints, rotations[joint] x y z w,
-/// to r slerp(1, r^-1 c, weight * joint weight), where c is the weighted mean of the keys.
+/// Changes the rotation r of each of the layer's joints (rotations[joint] x y z w) to
+/// r slerp(1, r^-1 c, weight * joint weight), where c is the weighted mean of the keys.
 void BlendLayer(const LayerBlend& layer, float* rotations);
 
 /// Computes sine and cosine of `count` angles with |x| <= 1e5. The results have the same bits as
 /// Sin and Cos of base/trig.h.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);
 
-/// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.
+/// Transposes `count` floats per lane: to[i][lane] = from[lane][i]. `from` has kBlock entries, none
+/// of them null.
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to);
 
-/// to[lane][j] = rotations[j][x y z w][lane] for `joint_count` joints.
+/// Copies the rotations of `joint_count` joints from each lane to a separate array of quaternions:
+/// to[lane][j] = rotations[j][x y z w][lane].
 void ScatterRotations(const float* rotations, std::size_t joint_count, std::size_t lanes,
                       float* const* to);
 
-/// Number of floats per joint that PrepareDifferences writes: the rotation vector of half the short
-/// arc, and the square of its length.
+/// Number of floats per joint that PrepareDifferences writes: the rotation vector of half the
+/// rotation, along the shorter arc, and the square of its length.
 inline constexpr std::size_t kDifferenceFloats = 4;
 /// Precomputes, for a difference pose [joint][x y z w][kBlock], the values that stay constant while
 /// it fades out: [joint][kDifferenceFloats][kBlock].

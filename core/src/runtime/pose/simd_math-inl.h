@@ -1,7 +1,7 @@
-// SIMD vector, quaternion and trigonometry types for the kernels. pose_kernels.cpp compiles this
-// file once per instruction set, which is why it has no ordinary include guard. It uses only
-// additions, multiplications, divisions, square roots and comparisons, each rounded separately, so
-// that all instruction sets produce the same bytes.
+// SIMD vectors, quaternions and trigonometry for the kernels. pose_kernels.cpp compiles this file
+// once per instruction set, so it has no ordinary include guard. It uses only additions,
+// multiplications, divisions, square roots and comparisons, each rounded separately, so that all
+// instruction sets produce the same bytes.
 #if defined(STRIDEWIRE_SIMD_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_SIMD_MATH_INL_H
 #undef STRIDEWIRE_SIMD_MATH_INL_H
@@ -153,11 +153,11 @@ HWY_INLINE SlerpParts SlerpPartsOf(SoaQuat q) {
       sign * Float(2.0f) * beside * AtanOverX(Min(xx * beside * beside, Float(1.0f)));
   return {SoaVec3{q.x, q.y, q.z} * per_sine, xx * per_sine * per_sine};
 }
-// Returns the slerp as a quaternion of length 1 to kLongestSlerp. The length does not matter until
-// the final normalization, so only the ratio of xyz to w must be accurate. A quotient of two short
-// polynomials approximates that ratio better than separate polynomials of the same length for sine
-// and cosine. They are interpolated at Chebyshev nodes in the square of half the angle; the error
-// of the angle is below 2e-8.
+// Returns the slerp as a quaternion of length 1 to kLongestSlerp. The caller normalizes the final
+// rotation, so only the ratio of xyz to w must be accurate. A quotient of two short polynomials
+// approximates that ratio better than separate polynomials of the same degree for sine and cosine.
+// They are interpolated at Chebyshev nodes in the square of half the angle; the error of the angle
+// is below 2e-8.
 constexpr float kLongestSlerp = 1.12f;
 HWY_INLINE SoaQuat SlerpOf(SlerpParts parts, Float fraction) {
   const Float square = parts.square * (fraction * fraction);
@@ -223,8 +223,8 @@ HWY_INLINE void StoreQuats(SoaQuat q, float* at, std::size_t left) {
 }
 
 // GatherQuats loads four floats from address(lane) for each lane and transposes them into four
-// vectors. The transposition happens in registers, because a vector load from memory that was just
-// written in parts would stall.
+// vectors. The transposition happens in registers, because loading a vector from memory that was
+// just written in smaller parts would stall the processor.
 #if HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
 // Transposes the 4 x 4 floats in each block of four lanes.
 HWY_INLINE void TransposeBlocks(hn::Vec<FloatTag>& a, hn::Vec<FloatTag>& b, hn::Vec<FloatTag>& c,

@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
 namespace {
 
-// Address of four consecutive floats in the row of each lane.
+// Returns the address of four consecutive floats in the row of a lane.
 struct RowAddress {
   const float* const* rows;
   std::size_t at;
@@ -73,8 +73,8 @@ void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::
   }
 }
 
-// Describes which lanes of one vector still have a difference pose ("eased"), which of them also
-// add its velocity ("inertial"), and how much of both remains.
+// Describes which lanes of one vector still have a difference pose ("eased") and which of them also
+// add its velocity ("inertial"). `fraction` and `half_s` determine how much of both is added.
 struct DifferenceState {
   bool is_any = false;
   bool is_any_inertial = false;
@@ -97,8 +97,8 @@ HWY_INLINE SoaQuat AddDifference(SoaQuat q, const DifferenceState& state,
   return Select(state.is_eased, eased, q);
 }
 
-// Transforms blended roots into world space. `sines` and `cosines` receive those of half the
-// heading of each pose.
+// Transforms the roots of blended poses into world space. Writes the sine and cosine of half the
+// heading of each root to `sines` and `cosines`.
 void TransformRoots(const FinishPosesJob& blend, const float* local, std::size_t lane,
                     float* root_m, float* sines, float* cosines) {
   const DoubleTag d;
@@ -151,8 +151,8 @@ bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
                              LoadLanes(blend.is_inertial + lane) < half);
       }
     }
-    // Adding the difference poses makes rotations longer. This is the squared length that a
-    // rotation of length kSmallestNorm may have afterwards.
+    // Adding the difference poses makes rotations longer. `shortest` is the maximum squared length
+    // that a rotation of length kSmallestNorm can have afterwards.
     Float shortest = kSmallestNorm * kSmallestNorm;
     if (state.is_any) shortest = shortest * Float(1.01f * kLongestSlerp * kLongestSlerp);
     if (state.is_any_inertial) {

@@ -53,8 +53,8 @@ struct SoaPoseEvaluator::Work {
   struct LaneDoubles {
     alignas(64) double of[kBlock] = {};
   };
-  // Maximum number of movements that BlendRows blends together. Their sums fit into the level-1
-  // cache.
+  // Maximum number of movements that BlendRows blends together. The weighted sums of this many
+  // movements fit into the level-1 cache.
   static constexpr std::size_t kMaxBlended = 8;
   static float* FloatsOf(std::vector<LaneFloats>& lanes) { return lanes.front().of; }
 
@@ -94,7 +94,7 @@ struct SoaPoseEvaluator::Work {
   std::size_t row_floats;
   int max_count;
 
-  // The following members describe the block that is being evaluated.
+  // The members from here to has_plant_fade describe the block that is being evaluated.
   std::array<SampleRun, kBlock> runs;
   std::size_t lanes = 0;
   std::size_t count = 0;
@@ -188,7 +188,7 @@ void SoaPoseEvaluator::Work::CollectDifferences() {
   for (std::size_t i = 0; i < lanes; ++i) {
     const Movement& of = movement(i);
     is_inertial_lane.of[i] = 0.0f;
-    // If a difference pose has faded out, later poses do not need it either.
+    // If the difference pose has already faded out at the first pose, no later pose needs it.
     if (samples[0].is_eased[i] == 0.0f) continue;
     is_eased = true;
     differences[i] = &of.difference.rotations[0].x;

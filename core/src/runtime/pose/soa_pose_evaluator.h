@@ -16,7 +16,8 @@ struct SampleRun {
   /// Movement to evaluate. If its feet are planted, its FootPlan::packed must be set.
   const Movement* movement = nullptr;
   double time_s = 0.0;  ///< Time of the first pose; clamped to the movement.
-  /// Length of a tick in seconds. The times of poses are summed tick by tick.
+  /// Length of a tick in seconds. The times of poses are summed tick by tick, as in a server, so
+  /// that rounding is the same.
   double step_s = 0.0;
   int ticks_apart = 1;  ///< Ticks between two poses.
 };
@@ -38,14 +39,16 @@ class SoaPoseEvaluator {
 
   [[nodiscard]] int max_count() const;
 
-  /// Starts the evaluation of `count` poses of at least one run. Either all movements have planted
-  /// feet or none. The movements must exist until the last pose has been evaluated.
+  /// Starts the evaluation of `count` poses of each run. There must be at least one run. Either all
+  /// movements have planted feet or none. The movements must exist until the last pose has been
+  /// evaluated.
   void Begin(std::span<const SampleRun> runs, int count);
   /// Returns the next pose of each run, in the lane of the run. Other lanes are undefined.
   [[nodiscard]] const SoaPose& Next();
 
-  /// Prefetch the memory that evaluation reads: first what SampleRunCount and
-  /// EvaluationBatcher::Add read, then the movement itself, and finally the arrays it points to.
+  /// These functions prefetch memory that evaluation reads. PrefetchTimes: what SampleRunCount and
+  /// EvaluationBatcher::Add read. PrefetchMovement: the movement itself. Prefetch: the arrays to
+  /// which the movement points.
   static void PrefetchTimes(const Movement& movement);
   static void PrefetchMovement(const Movement& movement);
   static void Prefetch(const SampleRun& run);

@@ -1,5 +1,5 @@
-// Arithmetic with doubles for WebAssembly, which Highway 1.0.3 lacks. Like simd_math-inl.h, which
-// includes it, this file is compiled once per instruction set.
+// Arithmetic with vectors of doubles for WebAssembly. Highway 1.0.3 does not provide it. Like
+// simd_math-inl.h, which includes it, this file is compiled once per instruction set.
 #if defined(STRIDEWIRE_WASM_DOUBLES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_WASM_DOUBLES_INL_H
 #undef STRIDEWIRE_WASM_DOUBLES_INL_H

@@ -17,27 +17,30 @@ constexpr std::size_t kMaxRows = kMaxParameters + 1;  // Rows of [J; 1].
 using Vector = std::array<double, kMaxRows>;
 using Matrix = std::array<Vector, kMaxRows>;
 
-// The scale of the change of each example is at least this fraction of the mean |w|.
+// In the scale D of the changes (see CorrectWeights), this fraction of the mean |w| is added to the
+// |w| of each example.
 constexpr double kMinUsage = 0.5;
 // Weights start to shrink when the sum of |w| is this far below its maximum.
 constexpr double kMargin = 0.1;
-// At errors below this, weights shrink less, so that they are a smooth function of the request.
+// If the error is not much larger than this, weights shrink less, so that they are a smooth
+// function of the request.
 constexpr double kShrinkErrorM = 1e-4;
 // Ridge added to the diagonal, relative to the trace. It handles directions that no example spans.
 constexpr double kRidge = 1e-9;
 constexpr int kMaxHalvings = 3;
-// Poses vary only in groups with at most this many parameters, that is, in straight steps. Other
-// steps are rarely repeated. Their examples differ so much that soles would enter the ground.
+// Stride variation changes poses only in groups with at most this many parameters, that is, in
+// straight steps. Other steps are rarely repeated. Their examples differ so much that soles would
+// enter the ground.
 constexpr std::size_t kMaxVariedParameters = 2;
 // Size of a variation in radians, as measured by PoseChange. Larger variations push the toes of
 // `builtin` into the ground.
 constexpr double kVariedRad = 0.04;
-// Fractions of a step at which the pose is measured.
+// Fractions of a step at which PoseChange measures the pose.
 constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
 // Maximum change of a weight relative to its value, before the effect on the parameters is removed.
 constexpr double kMaxRelativeChange = 3.0;
-// A group has few examples if it has fewer captured examples than this per coefficient of the
-// linear part.
+// A group of climbing steps has smaller limits on weights if it has fewer captured examples than
+// this per coefficient of the linear part.
 constexpr int kExamplesPerCoefficient = 4;
 // A variation is not used if it leaves an error above this.
 constexpr double kMaxVariedErrorM = 1e-4;
@@ -193,8 +196,8 @@ double PoseChange(const MotionGroup& group, const GridLayout& layout,
   return std::sqrt(squares / static_cast<double>(kVariedAt.size()));
 }
 
-// Adds a change to the weights [n]. `size_rad` is its size as measured by PoseChange. The change is
-// scaled to kVariedRad, or less if the limits on weights require it.
+// Adds a change to the weights [n]. `size_rad` is the size of the change as measured by PoseChange.
+// The change is scaled to kVariedRad, or less if the limits on weights require it.
 void AddVariation(std::span<const double> change, double size_rad, double max_sum,
                   std::span<double> weights) {
   constexpr double kTiny = 1e-9;

@@ -17,7 +17,7 @@ namespace stridewire {
 /// sum is the limit.
 inline constexpr double kMaxCorrectedWeightSum = 2.5;
 
-/// Conditions under which a correction stops, and limits on the resulting weights.
+/// Conditions under which the iterations of a correction stop, and limits on the weights w.
 struct CorrectionLimits {
   int max_iterations = 3;
   double tolerance_m = 1e-5;  ///< Iterations stop when the error is at most this.
@@ -42,14 +42,14 @@ inline constexpr double kSparseWeightSum = 1.4;
 
 /// Result of a correction.
 struct Correction {
-  /// Error after correction: |p^ - a| as in LargestDifference; <= initial_error_m.
+  /// Error after correction: largest difference between requested and measured parameters, as in
+  /// LargestDifference; <= initial_error_m.
   double error_m = 0.0;
-  double initial_error_m = 0.0;  ///< Error without correction: e(p^) = |p^ - a(p^)|.
+  double initial_error_m = 0.0;  ///< The same error without correction.
   int iterations = 0;
 };
 
-/// Memory for CorrectWeights, which is allocated once and used for all corrections. Use one per
-/// thread.
+/// Memory for CorrectWeights. It is allocated once and serves all corrections. Use one per thread.
 class CorrectionScratch {
  public:
   /// Allocates memory for groups of up to `max_example_count` examples. Borrows `skeleton`.

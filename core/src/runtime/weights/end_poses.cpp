@@ -31,8 +31,8 @@ void EndPoses::Gradient::Add(int joint, const DVec3& by_xyz, double by_w) {
 
 void EndPoses::Gradient::AddTo(const float* rows, std::size_t row_floats,
                                std::span<double> slopes) const {
-  // With the loop over joints outside, the compiler vectorizes the loop over the components. Each
-  // sum still adds the joints in order.
+  // The loop over joints is outside the loop over examples, so that the compiler vectorizes the
+  // loop over components. Each sum still adds the joints in order.
   constexpr std::size_t kBlock = 16;
   for (std::size_t first = 0; first < slopes.size(); first += kBlock) {
     const std::size_t count = std::min(kBlock, slopes.size() - first);

@@ -39,8 +39,8 @@ class EndPoses {
   // A joint of a chain.
   struct Link {
     DQuat rotation;
-    // 1 / |Q|, where Q is the weighted sum whose direction is `rotation`. 0 if the rotation is that
-    // of a single example.
+    // 1 / |Q|, where Q is the weighted sum of the examples' quaternions. 0 if Q is so short that
+    // the rotation of a single example is used instead.
     double per_norm;
     DVec3 arm;   // Vector from the joint to the ball, in the joint's axes.
     DVec3 ball;  // Vector from the joint to the ball, in the axes of the parent.

@@ -23,8 +23,8 @@ namespace stridewire {
                                               GridCache& cache, PoseSpan pose);
 
 /// Returns the largest difference between two parameter vectors of a group, in metres. A radian
-/// counts as kMetresPerRadian. This is the norm of the paper's interpolation error e(p) = |p -
-/// a(p)|.
+/// counts as kMetresPerRadian. For p and the measured parameters a(p), this is the paper's
+/// interpolation error e(p) = |p - a(p)|.
 [[nodiscard]] double LargestDifference(const MotionGroup& group, const ParameterValues& a,
                                        const ParameterValues& b);
 
