@@ -15,8 +15,8 @@ constexpr double kBumpM = 0.05;
 // If the ground ahead rises by more than this per metre, a foot does not tilt further.
 constexpr double kSteepRise = 0.27;
 
-// Lets a foot stand on its toes, with the heel off the ground. This is for ground that rises
-// steeply ahead, where the ankle would otherwise bend too far.
+// If the ground ahead rises steeply, changes the landing so that the foot stands on its toes, with
+// the heel off the ground. Otherwise, the ankle would bend too far.
 void StandOnToes(const LegRig::Side& side, FootTrajectory& trajectory) {
   Vec3& normal = trajectory.normals[1];
   const DVec3 forward = RotateYaw(trajectory.to.heading_rad, DVec3(0.0, 0.0, 1.0));

@@ -13,11 +13,11 @@ namespace stridewire {
 /// Position and heading of a foot that stands between two movements, and the corrections that
 /// planting adds to the blended foot at that time.
 struct FootLock {
-  Footprint print;
-  double height_m = 0.0;  ///< Height that is added to the blended foot.
-  double turn_rad = 0.0;  ///< Turn that is added to the blended foot.
-  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
-  double root_weight = 0.5;
+  Footprint print;                       ///< Where the foot stands, in world space.
+  double height_m = 0.0;                 ///< Height that is added to the blended foot.
+  double turn_rad = 0.0;                 ///< Turn that is added to the blended foot.
+  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Normal of the ground below the foot.
+  double root_weight = 0.5;              ///< FootTrajectory::root_weight
 };
 using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 
@@ -33,7 +33,7 @@ using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 [[nodiscard]] FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side,
                                     const Footprint& print);
 
-/// Changes `movement` so that both feet stay locked.
+/// Replaces the time warp and the foot plan of `movement` so that both feet stay locked.
 void StandOn(const FootLocks& locks, Movement& movement);
 
 /// Returns the foot locks at a time of a planned movement at which both feet stand. `pose` is the

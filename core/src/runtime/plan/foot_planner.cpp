@@ -21,7 +21,7 @@ namespace {
 // Velocities are differences between two samples, this long before and after a time.
 constexpr double kVelocityStepS = 0.004;
 
-// Largest shift of the root towards the centre between the feet.
+// Maximum shift of the root towards the centre between the feet (ShiftToCentre).
 constexpr double kMaxCentreShiftM = 0.1;
 // Maximum sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
@@ -31,8 +31,9 @@ constexpr double kMaxAsideM = 0.05;
 // at most kMaxEarlyLiftM.
 constexpr double kLevelClearanceM = 0.012;
 constexpr double kMaxEarlyLiftM = 0.03;
-// A foot that leaves the ground before the fraction kLeastSettled of the blend-in of its movement
-// is not corrected fully. Samples before the fraction kMostlySettled do not change the correction.
+// Fractions of the difference pose that have faded out. If less than kLeastSettled has faded out
+// when a foot leaves the ground, ReleaseHeight corrects its height only in part. Samples at which
+// less than kMostlySettled has faded out do not change the correction.
 constexpr double kLeastSettled = 0.2;
 constexpr double kMostlySettled = 0.7;
 
@@ -118,7 +119,8 @@ class Planner {
     return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
   }
 
-  // Chooses the base position so that the staying feet keep their positions, on average.
+  // Chooses the base position so that the staying feet keep their positions, on average. Also
+  // computes the heights for Level. The feet stay until `stance_end_s`.
   void SolveBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
     std::array<double, kStanceSamples.size()> times_s;
@@ -240,9 +242,9 @@ class Planner {
     return std::clamp(0.0, lowest.min_m, highest.max_m);
   }
 
-  // Returns by how much the soles of the blended pose must be raised at the end of a jump, [foot],
-  // so that they stand on ground at height `ground_m`. Otherwise, blends of very different jumps
-  // would end with a foot above or below the ground.
+  // Returns for each foot by how much its sole must be raised at the end of a jump, so that it
+  // stands on ground at height `ground_m`. Otherwise, blends of very different jumps would end with
+  // a foot above or below the ground.
   std::array<double, 2> EndLevelling(double ground_m) const {
     std::array<double, 2> raise_m{};
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -253,9 +255,9 @@ class Planner {
   }
 
   // Returns the height to add to the moving foot of a step between the end of the blend-in and its
-  // release, so that its sole stays on the ground at height `ground_m`. `start_m` is the added
-  // height at the start, and `settled_m` the added height at the end of the blend-in without
-  // levelling.
+  // release, so that its sole stays on the ground at height `ground_m`. `start_m` is the height
+  // that is added at the start, and `settled_m` is the height that would be added at the end of the
+  // blend-in without levelling.
   double ReleaseHeight(Foot moving, double ground_m, double start_m, double settled_m) const {
     const auto settled_at = [&](double time_s) {
       return 1.0 - EaseOut((time_s - movement_.start_offset_s) / movement_.ease_out_s);
@@ -353,7 +355,8 @@ class Planner {
         lift.max_m =
             std::min(lift.max_m, (kMaxHoverM - raised_m - feet.LowestSole(at, foot)) / share);
       }
-      // If no lift prevents both sinking and hovering, prefers the smaller of the two limits.
+      // If no lift prevents both sinking and hovering, `lift` is an empty range. The lift is then
+      // between its two limits, and as small as possible.
       const auto [least, most] = std::minmax(lift.min_m, lift.max_m);
       trajectory.settle_lift_m = std::clamp(stays ? 0.0 : std::max(least, 0.0), least, most);
     }
@@ -417,9 +420,9 @@ class Planner {
   }
 
  private:
-  // Returns the value of lift `lift` (FootTrajectory::lift_m) that keeps the moving foot at least
-  // `clearance_m` above level ground at these fractions of its swing. `first` is the index in
-  // times_s_ of the first fraction.
+  // Returns the smallest value of FootTrajectory::lift_m[lift] that keeps the moving foot at least
+  // `clearance_m` above level ground at the fractions `samples` of its swing. `first` is the index
+  // in times_s_ of the first of them.
   double LevelLift(Foot moving, std::size_t lift, double clearance_m,
                    std::span<const double> samples, std::size_t first) const {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
@@ -464,9 +467,9 @@ class Planner {
 
 namespace {
 
-// Plans the feet of a movement. The plan follows from `target` or, if that is null, from
-// `decision`, which another program has made. A replica that receives the decision computes the
-// same plan, because it uses the same code.
+// Plans the feet of a movement for `target`. If `target` is null, repeats the plan from `decision`,
+// which another program has made. A replica that receives the decision computes the same plan,
+// because it uses the same code.
 std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
                            const LandingDecision& decision) {
   const auto& [library, locks, source, scratch, pose, movement, transition] = job;
@@ -496,7 +499,8 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
     planner.SolveBase(locks, kBoth, times.release_s);
   }
 
-  // The difference pose is D = P - M, where P is the pose in which the previous movement ended.
+  // The difference pose is D = P - M, where P is the pose in which the previous movement ended, and
+  // M is the blended pose at the start of this movement.
   EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, scratch.cache(),
                 movement.difference);
   const FeetAt start = planner.FeetOf(movement.difference);
@@ -522,9 +526,9 @@ std::array<FeetAt, 2> Plan(const FootPlanJob& job, const LandingTarget* target,
     const FootLock& lock = locks[f];
     trajectory.from = trajectory.to = lock.print;
     trajectory.normals.fill(lock.normal);
-    // While the difference pose fades out, it moves and turns the feet. This is compensated, so
-    // that a foot on the ground neither sinks nor turns. Only the supporting foot may sink to its
-    // resting height.
+    // While the difference pose fades out, it moves and turns the feet. The plan compensates for
+    // this, so that a foot on the ground neither sinks nor turns. Only the supporting foot may sink
+    // to its resting height.
     const double sink_m = previous[f].ball_m.y - start[f].ball_m.y;
     const double turn_rad = WrapAngle(previous[f].heading_rad - start[f].heading_rad);
     const bool stays_down = is_step && f == x;

@@ -19,8 +19,8 @@ namespace stridewire {
 
 /// Target to which a movement should bring the feet.
 struct LandingTarget {
-  /// Request to satisfy exactly: its footprint if it has one, and otherwise its `applied`
-  /// parameters.
+  /// Request whose footprint the movement should reach exactly. If it has none, the target is given
+  /// by its `applied` parameters.
   const RequestPlan& request;
   /// Terrain. Null: level ground, whose height follows from the library and the request.
   const Terrain* terrain;
@@ -32,12 +32,12 @@ struct LandingTarget {
 /// The pose that a movement blends from.
 struct BlendSource {
   ConstPoseSpan before;  ///< Blended pose with difference pose, without planting.
-  /// The pose that precedes `before` by kBlendStepS (in seconds), if the velocity is kept.
+  /// The pose that precedes `before` by kBlendStepS, if the velocity is kept.
   std::optional<ConstPoseSpan> earlier;
 };
 
-/// Maximum angle by which planting turns the foot of the library's step to match a requested
-/// footprint. RequestPlan::most_residual_m is the limit for its position.
+/// Maximum angle by which planting turns the landing foot of the library's step to match a
+/// requested footprint. RequestPlan::most_residual_m is the corresponding limit for its position.
 inline constexpr double kMaxFootTurnRad = 0.35;
 /// Maximum shift of the root for a step that ends in a stand.
 inline constexpr double kMaxRootShiftM = 0.4;
@@ -57,12 +57,13 @@ struct FootPlanJob {
 
 /// Plans the feet of a movement. Sets `movement.feet`, the base position and the difference pose
 /// relative to the source. The base position is chosen so that the staying foot (in a jump, the
-/// centre of both feet) keeps its place, which prevents drift. Never allocates. Returns the feet of
-/// the blended pose with its difference pose, at the start of the movement and kBlendStepS later.
+/// centre of both feet) keeps its place. Walks therefore do not drift. Never allocates. Returns the
+/// feet of the blended pose with its difference pose, at the start of the movement and kBlendStepS
+/// later.
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingTarget& target);
 
 /// Repeats a plan from its decisions, with the same bits. Does not use the heading change of the
-/// movement.
+/// movement, which replicas do not know.
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingDecision& decision);
 
 /// Sets FootTrajectory::settle_lift_m of a planned step on level ground, so that its standing feet

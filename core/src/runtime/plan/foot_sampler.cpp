@@ -17,7 +17,7 @@ constexpr std::size_t kBlock = kernels::kBlock;
 }
 
 // Arrays for evaluating one movement at several times, with one time per lane. SetDifference sets
-// those of the difference pose.
+// `differences`, `ease`, `velocity`, `fastest`, `is_inertial`, `root_ease_m` and `root_ease_m_s`.
 struct FootSamplerLanes {
   static constexpr std::size_t kJoints = LegRig::kMaxJointsOfLegs;
   kernels::GridTimes times{};

@@ -21,7 +21,7 @@ class FootSampler {
   static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Maximum number of times per call.
 
   /// Borrows both arguments. The leg rig of the scratch's library must be usable. `pose` is scratch
-  /// memory as well: a pose of the library's skeleton.
+  /// memory as well. It must have one rotation per joint of the library's skeleton.
   FootSampler(FootPlanScratch& scratch, PoseSpan pose)
       : library_(scratch.library()), scratch_(scratch), pose_(pose) {}
 
@@ -30,8 +30,9 @@ class FootSampler {
   void SetDifference(const Movement& movement);
 
   /// Samples a movement at up to kMaxTimes times: the first `eased` of them with the difference
-  /// pose, as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache
-  /// may only contain rows of this movement. If `eased` is not 0, SetDifference must precede it.
+  /// pose, as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache of
+  /// the scratch memory must not contain rows of other movements. If `eased` is not 0, call
+  /// SetDifference first.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
   /// Returns the root at time `i`, in world space.
@@ -43,10 +44,10 @@ class FootSampler {
   /// Returns the height of the sole at time `i`, in world space: LegPose::LowestSole plus the
   /// height of the root.
   [[nodiscard]] double LowestSole(std::size_t i, Foot foot) const;
-  /// Returns the smaller of the heights of ball and ankle. From each, the height of the joint in a
-  /// flat, standing foot is subtracted.
+  /// Returns the smaller of two heights at time `i`, in world space: those of the ball and of the
+  /// ankle, each minus its height above the ground in the stand pose.
   [[nodiscard]] double LowestFlatSole(std::size_t i, Foot foot) const;
-  /// Same as LowestFlatSole, but also considers the toe tip.
+  /// Same as LowestFlatSole, for ball, ankle and toe tip.
   [[nodiscard]] double LowestPoint(std::size_t i, Foot foot) const;
 
  private:

@@ -8,7 +8,7 @@
 namespace stridewire {
 
 /// The choices that PlanFeet makes with the request and the terrain. The rest of a plan can be
-/// computed from them, so replicas need neither.
+/// computed from these choices, so replicas need neither the request nor the terrain.
 struct LandingDecision {
   double extra_turn_rad = 0.0;  ///< Movement::extra_turn_rad
   bool is_on_terrain = false;

@@ -17,9 +17,9 @@ struct LandingConditions {
 /// The predicted result of a planned step or jump, and its difference from the request.
 struct RequestError {
   RequestTarget reached;    ///< Result of the step or jump, in the form of its target.
-  double distance_m = 0.0;  ///< Distance between the landing places, >= 0.
-  /// Angle between the paths to the landing places, or between the headings, whichever is larger;
-  /// >= 0. Paths are compared only if the landing places differ and are not close to the start.
+  double distance_m = 0.0;  ///< Distance between the requested and the reached place, >= 0.
+  /// The larger of two angles: between the paths to these places, and between the headings there;
+  /// >= 0. Paths are compared only if the places differ and are not close to the start.
   double angle_rad = 0.0;
 
   [[nodiscard]] bool IsTooLarge() const {

@@ -28,12 +28,12 @@ constexpr double kCostPerParameterM = 1e-3;
 // Groups whose costs differ by less than this fit equally well. Requests often lie on the border of
 // a group, where rounding errors must not choose between it and another group.
 constexpr double kTieM = 1e-5;
-// A standing avatar starts with the other foot than expected only if that reduces the cost by this
-// much.
+// A standing avatar moves the foot that moved last, instead of the other one, only if that reduces
+// the cost by at least this.
 constexpr double kFootPreferenceM = 0.01;
 
 // Additional cost of a group with turn, side or height parameters for a request that specifies none
-// of them. Such parameters take arbitrary values and would bend a straight walk.
+// of them. In its steps, these parameters take arbitrary values, which would bend a straight walk.
 constexpr double kStraightPreferenceM = 0.15;
 // Additional cost of a group whose steps were generated because the captures lack them. Captured
 // steps are preferred if they fit nearly as well.
@@ -119,8 +119,8 @@ double DistanceOutsideRange(const MotionGroup& group, std::span<const double> me
   return std::sqrt(sum);
 }
 
-// Returns the additional cost of a captured group in a completed library, for steps with these
-// parameters.
+// Returns the additional cost of a captured group in a library with generated groups, for steps
+// with these parameters (see kNearExampleM).
 double FarFromExamplesCost(const MotionGroup& group, std::span<const double> values) {
   double nearest = HUGE_VAL;
   for (int e = 0; e < group.example_count; ++e) {
@@ -161,7 +161,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
     }
   }
 
-  // If the group lacks the parameter of a requested value, its steps have the neutral value.
+  // If the group lacks a requested parameter, its steps have the neutral value of that parameter.
   double missed_m = 0.0;
   for (const ParameterName name :
        {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {

@@ -29,16 +29,16 @@ struct RequestTarget {
   double turn_rad = 0.0;  ///< Change of heading.
 };
 
-/// Limits for the steps of avatars in a hurry. In captures, the quickest steps of people who turn,
-/// stop or walk briskly take 0.4 to 0.5 s.
+/// Limits for steps of avatars in a hurry: minimum duration in seconds, and maximum playback speed.
+/// In captures, the quickest steps of people who turn, stop or walk briskly take 0.4 to 0.5 s.
 inline constexpr double kQuickStepS = 0.5;
 inline constexpr double kHurriedRate = 1.6;
 
-/// Determines how fast the movements of a request are played if they would take long.
+/// Determines how fast a movement is played if it would take long.
 struct PlaybackPace {
   double max_rate = 1.0;             ///< Maximum playback speed; 1 is that of the examples.
   double long_s = kQuickStepS;       ///< Movements up to this duration are not played faster.
-  double shortened_s = kQuickStepS;  ///< Duration of longer ones, if `max_rate` allows it.
+  double shortened_s = kQuickStepS;  ///< Duration of longer movements, if `max_rate` allows it.
 
   /// Returns the playback speed of a movement whose examples take `duration_s`.
   [[nodiscard]] double RateOf(double duration_s) const {
@@ -50,7 +50,8 @@ struct PlaybackPace {
 struct RequestPlan {
   int group = -1;
   ParameterValues requested;  ///< Parameters of the group that correspond to the request.
-  /// Target of the request. If no side was requested, `vector_m.x` is that of the current feet.
+  /// Target of the request. If no side was requested, `vector_m.x` is the current sideways distance
+  /// between the feet.
   RequestTarget target;
   /// The point closest to `requested` in the hull of the examples, enlarged by 10 %.
   ParameterValues applied;
@@ -73,14 +74,14 @@ struct RequestPlan {
   double cost_m = 0.0;
 };
 
-/// Requests may be outside the hull of the examples by this fraction of its size. Extrapolation by
-/// 0.2 m costs 80 mm of accuracy.
+/// Requests may be outside the hull of the examples by this fraction of its size. The fraction is
+/// small, because extrapolation by 0.2 m causes errors of 80 mm.
 inline constexpr double kHullGrowth = 0.1;
 
 /// Maximum distance between the end of a library's step and its footprint that planting may
-/// distribute over the swing, for footprints beside the other foot or at the goal of a walk. In
-/// libraries without steps in place, this is the only way to close the feet and to turn on the
-/// spot.
+/// distribute over the swing. It applies to footprints of walks and beside the other foot. In
+/// libraries without steps in place, this is the only way to bring the feet together and to turn on
+/// the spot.
 inline constexpr double kMaxPlantedErrorM = 0.6;
 
 /// Plans a step in the group that covers it best, with parameters clamped to the hull of the group.
@@ -117,8 +118,8 @@ enum class FootprintUse { kRequested, kWalk };
                                                   const JumpRequest& request);
 
 /// Returns the change of heading of a movement without an extra turn. In groups without a turn
-/// parameter, this is the mean turn of the examples, weighted by their distance from the
-/// parameters.
+/// parameter, this is the weighted mean turn of the examples. The weight of an example is inversely
+/// proportional to the squared distance of its parameters from `values`.
 [[nodiscard]] double NaturalTurn(const MotionGroup& group, const ParameterValues& values);
 
 }  // namespace stridewire

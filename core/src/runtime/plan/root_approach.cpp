@@ -10,14 +10,14 @@
 namespace stridewire {
 namespace {
 
-// Maximum acceleration of the root in the blend from the previous pose, unless the blend would then
-// take longer than kMaxApproachS. In captures of starts and stops, the acceleration of blend and
-// movement together is 4 to 4.6 m/s^2.
+// Maximum acceleration of the root due to the blend from the previous pose, unless the blend would
+// then take longer than kMaxApproachS. The movement itself accelerates the root as well. In
+// captures of starts and stops, the root accelerates by 4 to 4.6 m/s^2 in total.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
 constexpr double kMaxApproachS = 0.8;
 // Vertical accelerations have a smaller weight, because climbing legs push the body up.
 constexpr double kVerticalWeight = 0.4;
-// On terrain the blend is shorter, because a climbing or descending leg has less reach.
+// On terrain the blend is shorter, because a climbing or descending leg has less reach to spare.
 constexpr double kMaxTerrainApproachS = 0.35;
 // In strides the blend is shorter, too. Otherwise, the pelvis would lag behind when it passes the
 // standing foot, where each centimetre bends the knee by several degrees.

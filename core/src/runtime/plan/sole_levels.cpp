@@ -47,8 +47,8 @@ double Levelling(double above_m) {
   return std::clamp(0.0, range.min_m, range.max_m);
 }
 
-// Starts with the quartic that levels the sole at five samples. While it is out of range at other
-// samples, corrects it for one sample after the other (Kaczmarz method).
+// Starts with the quartic that levels the sole at kLevelSamples. While the quartic is out of range
+// at other samples, corrects it for one sample after the other (Kaczmarz method).
 Quartic LevellingQuartic(const std::array<double, kStanceSamples.size()>& above_m,
                          const std::array<HeightRange, kStanceSamples.size()>& ranges) {
   constexpr int kSweeps = 20;

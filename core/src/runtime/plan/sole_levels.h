@@ -13,9 +13,9 @@ inline constexpr double kMaxHoverM = 0.006;
 inline constexpr double kMaxSinkM = 0.003;
 inline constexpr double kMaxLevelM = 0.05;
 
-// kStanceSamples are fractions of the stance at which a standing foot is sampled. The sole is
-// levelled at the samples with the indices kLevelSamples. At the other samples it may exceed the
-// limits by kStanceSlackM.
+// kStanceSamples are fractions of the stance at which a standing foot is sampled. The sole is kept
+// within these limits at the samples with the indices kLevelSamples. At the other samples it may
+// exceed them by kStanceSlackM.
 inline constexpr std::array<double, 16> kStanceSamples{
     0.0, 0.04, 0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.58, 0.67, 0.75, 0.83, 0.9, 0.95, 0.98, 1.0};
 inline constexpr std::array<std::size_t, 5> kLevelSamples{0, 4, 7, 10, 15};
@@ -38,16 +38,17 @@ struct HeightRange {
   double max_m = 0.0;
 };
 
-/// Returns the range of heights by which to raise a sole that is `above_m` above the ground, so
-/// that it exceeds the usual limits by at most `slack_m`.
+/// Returns the range of heights by which a sole that is `above_m` above the ground may be raised,
+/// so that it exceeds kMaxHoverM or kMaxSinkM by at most `slack_m`.
 [[nodiscard]] HeightRange LevellingRange(double above_m, double slack_m = 0.0);
 
-/// Returns by how much a sole that is `above_m` above the ground must be raised.
+/// Returns by how much a sole that is `above_m` above the ground must be raised to be within the
+/// limits. Negative if it must be lowered, 0 if it is within them already.
 [[nodiscard]] double Levelling(double above_m);
 
-/// Returns a curve of heights over a stance that keep a sole on the ground if they are added to the
-/// heights of the foot. `above_m` are the heights of the sole above the ground at kStanceSamples
-/// without the curve, and `ranges` limit the curve at these samples.
+/// Returns a curve over a stance which, if it is added to the height of the foot, keeps the sole on
+/// the ground. `above_m` contains the heights of the sole above the ground at kStanceSamples,
+/// without the curve. `ranges` limits the curve at these samples.
 [[nodiscard]] Quartic LevellingQuartic(
     const std::array<double, kStanceSamples.size()>& above_m,
     const std::array<HeightRange, kStanceSamples.size()>& ranges);

@@ -23,10 +23,11 @@ constexpr double kMaxLooseErrorRad = 0.5;
 // kMaxExtraTurnRad, libraries without steps that turn on the spot would need ten steps for a
 // half-turn.
 constexpr double kMaxWalkTurnRad = 0.6;
-// When the planner looks ahead, the limits on distances and angles above apply as they are. For the
-// next step itself they are multiplied by kSlack, because feet do not land exactly as predicted.
+// When the planner looks ahead, the limits on the errors of distances and angles apply as they are.
+// For the next step itself they are multiplied by kSlack, because feet do not land exactly as
+// predicted when the planner looked ahead.
 constexpr double kSlack = 1.05;
-// After a step that is not longer than this, the body is above both feet.
+// A step that is not longer than this ends with the body above both feet, not above one of them.
 constexpr double kForwardM = 0.2;
 
 // Steps that are shorter than kStrideM or turn by more than kHurriedTurnRad are played fast.
@@ -44,7 +45,8 @@ constexpr double kBearingToes = 0.3;
 // A tread ends where the ground rises or drops by more than kEdgeM within kEdgeStepM.
 constexpr double kEdgeM = 0.04;
 constexpr double kEdgeStepM = 0.02;
-// Maximum height of an obstacle along a swing, above both ends of the swing.
+// Maximum height of an obstacle along a swing, above the highest of the two ends of the swing and
+// the standing foot. Ground within kHurdleRadiusM of the path counts as an obstacle.
 constexpr double kMaxHurdleM = 0.25;
 constexpr double kHurdleRadiusM = 0.06;
 

@@ -12,30 +12,30 @@
 
 namespace stridewire {
 
-/// Maximum distance between the library's own step and the footprint, which planting distributes
-/// over the swing. For small steps, and for steps that were chosen by comparison, the maximum is
-/// kMaxPlantedErrorM.
+/// Maximum distance between the end of the library's own step and the footprint. Planting
+/// distributes this distance over the swing. For short steps, and for plans that are not strict
+/// (StepPlanner::Plan), the maximum is kMaxPlantedErrorM.
 inline constexpr double kMaxStepErrorM = 0.16;
-/// Maximum error of the heading of the body after a step of a strict plan. Planting cannot change
-/// that heading.
+/// Maximum error of the heading of the body after a step of a strict plan (StepPlanner::Plan).
+/// Planting cannot change that heading.
 inline constexpr double kMaxStepErrorRad = 0.015;
-/// Steps that climb or descend by more than this are not played fast, because people do not take
-/// stairs faster if their treads are short.
+/// Steps that climb or descend by more than this are not played faster, even if they are short,
+/// because people do not climb stairs faster if the treads are short.
 inline constexpr double kUnhurriedClimbM = 0.08;
 
 /// A step that the library contains, and its result.
 struct PlannedStep {
   RequestPlan plan;
   Foot moved = Foot::kLeft;
-  Footprint print;
+  Footprint print;           ///< Where the moving foot lands.
   double heading_rad = 0.0;  ///< Heading of the body after the step.
-  double error_m = 0.0;      ///< Distance that planting distributes over the swing.
+  double error_m = 0.0;      ///< Distance from the end of the library's own step to `print`.
   bool is_last = false;      ///< True if the step leads to the foot's place at the goal.
 };
 
 /// Finds steps of the library for the footprints that a walk proposes, on ground that supports the
-/// foot. Counts the footprints whose ground it checks (kMaxWalkCandidates), so it serves one step
-/// of a walk.
+/// foot. Use a new planner for each step of a walk, because a planner checks the ground at no more
+/// than kMaxWalkCandidates footprints.
 class StepPlanner {
  public:
   /// If `checks_ground` is false, the ground determines only the height of a footprint, and not
@@ -45,11 +45,11 @@ class StepPlanner {
               bool checks_ground);
 
   /// Plans a step of a foot. Returns nullopt if the library has no such step that ends on suitable
-  /// ground. A strict plan requires little correction by planting.
+  /// ground. A strict plan requires a step that planting has to correct only a little.
   std::optional<PlannedStep> Plan(Foot moving, const WalkStep& step, bool is_strict);
 
-  /// Returns the step with its footprint rotated about the standing foot, so that the foot has the
-  /// heading of the body after the step. `planned` is the result of the last call of Plan.
+  /// Returns a step whose footprint is that of `planned`, rotated about the standing foot so that
+  /// the foot has the heading of the body after the step. `planned` is the result of the last Plan.
   [[nodiscard]] WalkStep TurnedWith(const PlannedStep& planned) const;
 
   /// Returns true if both feet can stand at their footprints at the goal. Requires a terrain.
@@ -77,27 +77,27 @@ class StepPlanner {
   static bool Carries(const FootSupport& support);
   bool Carries(Foot foot, const Footprint& print) const;
   bool Carries(const Footprint& print);
-  // Returns the support of the moving foot. Remembers it, because several checks need the support
-  // of the same footprint.
+  // Returns the support of the moving foot at a footprint. Keeps the last result, because several
+  // checks need the support of the same footprint.
   const FootSupport& SupportAt(const Footprint& print);
-  // Returns the carried fraction of a sole that may overhang the tread below it. Returns 0 if the
+  // Returns FootSupport::carried of a sole that may overhang the tread below it. Returns 0 if the
   // tread does not carry enough of the sole.
   double CarriedByTread(const Footprint& print);
-  // Returns true if a footprint is on a tread that is too short for the foot and the room that the
-  // foot needs in front of its toes and behind its heel.
+  // Returns true if a footprint is on a tread that is shorter than the foot plus the room that it
+  // needs in front of its toes and behind its heel.
   bool IsOnShortTread(const Footprint& print) const;
   // Returns true if the ground carries the sole or, on a short tread, enough of it.
   bool CarriesOrOverhangs(const Footprint& print);
   // Returns true if the ground does not rise abruptly right in front of the toes or behind the
   // heel. The slope of the ground up to there does not count as an abrupt rise.
   bool HasRoom(const Footprint& print) const;
-  // Returns the footprint, moved forward or backward if its toes or heel would touch a riser and
-  // the tread has room for that. On a tread that is too short for the foot, moves the footprint to
-  // where the tread carries most of the sole.
+  // Returns `print`. If its toes or heel would touch a riser and the tread has room, moves it
+  // forward or backward. On a tread that is too short for the foot, moves it to where the tread
+  // carries most of the sole.
   Footprint WithRoom(const Footprint& print);
-  // Returns the footprint. If the step would climb or descend more than is easy, moves the
-  // footprint back towards the standing foot: onto a tread in between or, if there is none and the
-  // step is long, to the ground in front of the edge.
+  // Returns `print`. If the step would climb or descend by more than kEasyClimbM, moves it back
+  // towards the standing foot: onto a tread in between or, if there is none and the step is long,
+  // onto the ground in front of the edge.
   Footprint WithEasyClimb(const Footprint& print);
   // Returns true if the foot can stand at the footprint and reach it without a high swing.
   bool IsGood(const Footprint& print);

@@ -8,8 +8,8 @@
 namespace stridewire {
 namespace {
 
-// In mid-swing, a foot is at least kClearanceM above the highest ground within kPassingRadiusM,
-// unless this requires a lift above kMaxLiftM.
+// In mid-swing, a foot stays at least kClearanceM above the highest ground within a horizontal
+// distance of kPassingRadiusM, unless this requires a lift above kMaxLiftM.
 constexpr double kClearanceM = 0.037;
 constexpr double kPassingRadiusM = 0.02;
 // The middle lift may be negative if the foot has to rise elsewhere in the swing. It lowers the

@@ -42,7 +42,7 @@ struct SwingPath {
 
 /// Returns the lowest and flattest path on which the sole clears the ground. If the foot has to
 /// rise, the path may also shift it by up to 0.12 m forward or backward in the middle of the swing.
-/// The foot then passes the edge of a tread earlier or later, when it is higher.
+/// The foot then passes the edge of a tread earlier or later, at a time at which it is higher.
 [[nodiscard]] SwingPath ChooseSwing(const SwingSoles& soles, const FootTrajectory& trajectory,
                                     const Terrain& terrain);
 

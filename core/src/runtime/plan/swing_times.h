@@ -5,7 +5,8 @@
 
 namespace stridewire {
 
-/// Times at which the moving feet leave the ground and land, with or without planting.
+/// Times at which the moving feet of a movement leave the ground and come to rest, in seconds. They
+/// are the same with and without planting.
 struct SwingTimes {
   double release_s = 0.0;
   double land_s = 0.0;

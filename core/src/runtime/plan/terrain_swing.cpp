@@ -17,10 +17,9 @@ namespace {
 constexpr std::array<double, 4> kSinkSamples{0.55, 0.7, 0.85, 1.0};
 constexpr double kMaxRootSinkM = 0.3;
 // A leg whose foot descends by kFullDescentM or more is extended to at most kDescentExtension of
-// its length when it lands, so that its knee is still bent. For smaller descents, the limit is
-// between kDescentExtension and kLongestExtension. Without this limit, the knee would bend abruptly
-// while the foot descends, because it was nearly straight. The limit applies after the fraction
-// kBentLanding of the swing.
+// its length when it lands, so that its knee is bent. For smaller descents, the limit is between
+// kDescentExtension and kLongestExtension. Without this limit, the knee would be nearly straight
+// and would then bend abruptly. The limit applies from the fraction kBentLanding of the swing on.
 constexpr double kDescentExtension = 0.97;
 constexpr double kFullDescentM = 0.15;
 constexpr double kBentLanding = 0.85;

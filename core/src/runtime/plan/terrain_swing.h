@@ -9,7 +9,7 @@ namespace stridewire {
 /// footprints (ChooseSwing).
 void ClearGround(const FootPlanJob& job, Foot moving, const Terrain& terrain);
 
-/// Returns by how much the root must be lower at the end of a planned step, so that both legs reach
+/// Returns by how much a planned step must lower the root until its end, so that both legs reach
 /// their footprints. The root then descends gradually (RootSinkShare). Otherwise, planting would
 /// lower it abruptly just before the foot lands on a lower tread.
 [[nodiscard]] double RootSink(const FootPlanJob& job, Foot moving);

@@ -11,12 +11,14 @@
 namespace stridewire {
 namespace {
 
+// The feet are apart if the sideways distance between them differs from that of the stand pose by
+// more than this.
 constexpr double kFeetApartAsideM = 0.3;
 
 // Planting can distribute an error up to this size over a swing (RequestPlan::most_residual_m).
 constexpr double kMaxStartErrorM = 0.25;
-// Minimum reduction of a request's cost by an inserted step: kMinStepGainM for steps,
-// kMinClosingGainM for jumps, whose cost is the distance between the feet.
+// An inserted step must reduce the cost of the request by at least kMinStepGainM for steps and by
+// kMinClosingGainM for jumps, whose cost is the distance between the feet (CostM).
 constexpr double kMinStepGainM = 0.25;
 constexpr double kMinClosingGainM = 0.03;
 
@@ -52,8 +54,8 @@ class TransitionPathFinder {
   }
 
  private:
-  // If the group of a step may not follow the previous movement, returns the best plan in a group
-  // that may. Captured and generated strides, for example, can be too different.
+  // If the group of the requested step may not follow the previous movement, returns the best plan
+  // in a group that may. Captured and generated strides, for example, can be too different.
   std::optional<RequestPlan> FindOtherGroup(const std::optional<RequestPlan>& direct,
                                             const Stance& stance) const {
     if (step_ == nullptr || !direct ||

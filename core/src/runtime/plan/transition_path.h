@@ -14,9 +14,9 @@ namespace stridewire {
 /// without them, or before a stand.
 inline constexpr int kMaxInsertedSteps = 3;
 
-/// Returns true if the feet are further from their positions in the stand pose, forward or
-/// sideways, than a stand allows. The sideways limit is larger, because few libraries have steps
-/// that bring the feet together sideways.
+/// Returns true if the feet are apart: the vector between them differs from that of the stand pose
+/// by more than a stand allows, forward or sideways. The sideways limit is larger, because few
+/// libraries have steps that bring the feet together sideways.
 [[nodiscard]] bool AreFeetApart(const FootState& feet, const FootState& stand);
 
 /// Returns true if the request is a step or jump with `allow_nearest`.
@@ -49,13 +49,13 @@ struct TransitionPath {
 /// - If the feet are apart, they must come together before a jump, and before a step of the foot
 ///   that moved last. This is not necessary if they are within 0.25 m of their positions in the
 ///   movement's examples. In this case, a step is inserted only if it brings the feet closer
-///   together by 3 cm or reduces the cost of the request by 0.25 m.
+///   together by 3 cm (before a jump) or reduces the cost of the request by 0.25 m (before a step).
 /// - No steps are inserted before steps to footprints.
-/// - No step is inserted if the request would still be out of reach after it (RequestError). The
-///   plan of a request that begins at once may be out of reach.
+/// - No step is inserted if the request would still be out of reach after it (RequestError). If no
+///   step is inserted, the returned plan may be out of reach.
 ///
-/// The search tries one inserted step first, then two, then three. It plans at most 22 steps to
-/// insert, and the request at most 15 times. Never allocates.
+/// The search tries one inserted step first, then two, then three. It plans at most 22 inserted
+/// steps, and the request at most 15 times. Never allocates.
 [[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library,
                                                 const MovementRequest& request,
                                                 const std::optional<RequestPlan>& direct,

@@ -15,19 +15,19 @@ namespace stridewire {
 /// depends mostly on the number of calls.
 class TransitionSamples {
  public:
-  /// Fractions of the time before the release of the moving foot.
+  /// Fractions of the time from the start of the movement to the release of the moving foot.
   static constexpr std::array<double, 2> kReleaseSamples{0.6, 0.8};
   /// Fractions of the swing, shortly before the landing.
   static constexpr std::array<double, 3> kLandingSamples{0.9, 0.94, 0.97};
-  /// Fractions of the blend-in.
+  /// Fractions of the blend-in, in which the difference pose fades out.
   static constexpr std::array<double, 7> kSettleSamples{0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8};
 
   // Indices of the first sample of each kind.
   static constexpr std::size_t kRelease = 0;
   static constexpr std::size_t kLanding = kRelease + kReleaseSamples.size();
-  /// The start of the movement, and start_step_s() later.
+  /// Two samples: at the start of the movement, and start_step_s() later.
   static constexpr std::size_t kStart = kLanding + kLandingSamples.size();
-  /// Only sampled if `settles`.
+  /// Samples of the blend-in. They exist only if Sample was called with `settles`.
   static constexpr std::size_t kSettle = kStart + 2;
 
   /// Borrows both arguments, as FootSampler does.

@@ -23,15 +23,16 @@ constexpr double kArrivedRad = 0.004;
 constexpr double kRoughlyArrivedM = 0.15;
 constexpr double kRoughlyArrivedRad = 0.25;
 
-// The pace of other steps if no speed was requested. People who walk to a goal take 100 to 110
-// steps per minute.
+// Pace of level steps for which StepPlanner sets none, in walks without a requested speed. People
+// who walk to a goal take 100 to 110 steps per minute.
 constexpr PlaybackPace kBriskPace{.max_rate = 1.4, .long_s = 0.68, .shortened_s = 0.6};
 
 // Cost of each metre of PlannedStep::error_m above kMaxStepErrorM.
 constexpr double kErrorWeight = 0.35;
-// Steps are compared by the sum of efforts (WalkSteering::EffortM) and costs, in metres. This is
-// the weight of the effort that remains after the first step. It is added to the effort that
-// remains after both steps. Without it, the walk could postpone its progress for ever.
+// Steps are compared by the sum of efforts (WalkSteering::EffortM) and costs, in metres. The main
+// term is the effort that remains after the step and the following step. The effort that remains
+// after the step alone is added with this weight, so that a walk does not postpone its progress
+// for ever.
 constexpr double kFirstWeight = 0.2;
 // Cost per metre that the body moves. It makes the walk turn in place rather than in a wide curve.
 constexpr double kPathWeight = 0.15;
@@ -39,8 +40,8 @@ constexpr double kPathWeight = 0.15;
 constexpr double kIdleStepM = 0.1;
 // Cost of a step after which the other foot cannot continue.
 constexpr double kDeadEndM = 1.0;
-// Cost of arriving with another heading, per radian. It exceeds the effort of a turn, so that the
-// walk continues if the library can turn further.
+// Cost of arriving with a heading other than the requested one, per radian. It exceeds the effort
+// of a turn, so that the walk continues if the library can turn further.
 constexpr double kMissWeight = 0.6;
 // Expected duration of a step, for looking ahead.
 constexpr double kExpectedStepS = 0.6;
@@ -107,7 +108,7 @@ class StepComparison {
     best_ = planned;
   }
   // Returns true if the walk makes progress with this step, or with this step and the next one. A
-  // foot may take its place at the goal only if the other foot can follow.
+  // foot may step to its place at the goal only if the other foot can follow.
   [[nodiscard]] bool LeadsOn(const WalkStance& stance, const PlannedStep& step) const {
     const LocomotionProfile& profile = library_.locomotion_profile();
     const WalkStance after = After(stance, step);

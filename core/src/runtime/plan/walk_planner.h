@@ -26,11 +26,11 @@ struct WalkStance {
   std::array<bool, 2> is_aimed{};
 };
 
-/// Progress of a walk. A new walk starts with a default value.
+/// Progress of a walk. A new walk starts with a default-constructed value.
 struct WalkProgress {
   std::size_t next_waypoint = 0;
   int steps = 0;
-  int steps_without = 0;  ///< Number of steps since the walk last made progress.
+  int steps_without = 0;  ///< Number of successive steps without progress.
   /// Minimum of the remaining effort so far (WalkSteering::EffortM).
   double least_effort_m = std::numeric_limits<double>::infinity();
   /// True if a step of this walk was changed because the ground at its footprint does not support a
@@ -40,7 +40,7 @@ struct WalkProgress {
   std::array<bool, 2> is_aimed{};
 };
 
-/// Measures the speed of a walk. A new walk starts with a default value.
+/// Measures the speed of a walk. A new walk starts with a default-constructed value.
 class WalkPace {
  public:
   /// Call it where a step of the walk begins or ends, with the base frame and the time.
@@ -68,12 +68,12 @@ enum class WalkOutcome : std::uint8_t { kStep, kArrived, kRefused };
 struct WalkDecision {
   WalkOutcome outcome = WalkOutcome::kArrived;
   RequestPlan plan;  ///< The planned step. Set for kStep.
-  /// Reason of a refusal, as one sentence in static storage. Set for kRefused.
+  /// Reason why the walk cannot continue, in static storage. Set for kRefused.
   const char* reason = "";
 };
 
-/// Limits of a walk. It ends after kMaxStepsWithout successive steps without progress, or after
-/// kMaxDetourSteps of them if it makes a detour around ground that does not support a foot.
+/// Limits of a walk. It ends after kMaxStepsWithout successive steps without progress. If it makes
+/// a detour around ground that does not support a foot, it ends after kMaxDetourSteps such steps.
 inline constexpr int kMaxWalkSteps = 10'000;
 inline constexpr int kMaxStepsWithout = 2;
 inline constexpr int kMaxDetourSteps = 16;
@@ -90,9 +90,9 @@ inline constexpr int kMaxWalkCandidates = 256;
 /// the effort that remains after them.
 ///
 /// Every decision applies to one step only, so a changed terrain or goal takes effect with the next
-/// step. Never allocates. The time is bounded by kMaxWalkCandidates ground checks and, on level
-/// ground, 160 calls of PlanFootprint. Most steps of libraries with starts, stops and turns need
-/// one call.
+/// step. Never allocates. A call checks the ground at up to kMaxWalkCandidates footprints. On level
+/// ground, it calls PlanFootprint at most 160 times. Most steps of libraries with starts, stops and
+/// turns need one call.
 [[nodiscard]] WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                                         const WalkRequest& walk, const WalkStance& stance,
                                         WalkProgress& progress);

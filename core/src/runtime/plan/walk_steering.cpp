@@ -41,7 +41,7 @@ constexpr double kSideEffort = 1.5;
 // If the goal is further away than kMaxShiftM, an avatar turns and walks forward. It may reach
 // closer goals with steps sideways or backward. With libraries whose longest step backward is
 // shorter than kBackM, the limit is kMaxShiftWithoutBackM, because avatars then have to combine
-// other steps.
+// steps of other kinds.
 constexpr double kMaxShiftM = 2.0;
 constexpr double kMaxShiftWithoutBackM = 1.3;
 constexpr double kBackM = 0.2;
@@ -52,14 +52,15 @@ constexpr double kSideStepM = 0.32;
 constexpr double kLongSideStepM = 0.345;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
-// Expected duration of a stride, for comparing paths to a goal. Steps that turn on the spot or lead
-// sideways or backward are played fast (RequestPlan::pace) and take kQuickStepS.
+// Expected duration of a step forward, for comparing paths to a goal. Steps that turn on the spot
+// or lead sideways or backward are played fast (RequestPlan::pace) and take kQuickStepS.
 constexpr double kStrideS = 0.62;
-// If a library has only strides, or no steps backward, the avatar steps sideways only if that saves
-// more than this time.
+// If a library has no short steps, or no steps backward, the avatar steps sideways only if that
+// saves at least this time.
 constexpr double kStrideMarginS = 0.3;
 
-// If the angle between an avatar's heading and its path exceeds this, it first turns on the spot.
+// If the angle between an avatar's heading and its path exceeds this, the avatar first turns on the
+// spot.
 constexpr double kSlowTurnRad = 0.7;
 // The walk approaches the goal in a curve that ends in the heading at the goal. The length of the
 // curve is this fraction of the remaining distance, at most kCurveM. The curve fades out for
@@ -396,7 +397,7 @@ WalkStep WalkSteering::StepTo(const Body& body, Foot moving) const {
 }
 
 // Returns the number of equal steps for a distance. If the stand pose of the library is a stride,
-// the rear foot must take the last step, which decides whether the number is odd or even.
+// the rear foot must take the last of these steps, so the number must be odd or even accordingly.
 double WalkSteering::StepCount(Foot moving, double distance_m, bool is_last_leg) const {
   const double steps = PartCount(distance_m, StepM());
   if (!profile_.stands_in_stride || !is_last_leg) return steps;

@@ -17,9 +17,9 @@ struct WalkStep {
   bool is_last = false;
 };
 
-/// Computes where the next steps of a walk should lead. It assumes level ground and feet that can
-/// reach every place within a box. The planner then checks which of these steps the library and the
-/// ground permit.
+/// Computes where the next steps of a walk should lead. It assumes level ground, and feet that can
+/// reach every place within fixed limits ahead, behind and to the side. StepPlanner then checks
+/// which of these steps the library and the ground permit.
 ///
 /// The position of the body is derived from the staying foot, as if the other foot stood beside it.
 /// Each step moves the body by an equal part of the remaining distance. If the stand pose of the
@@ -37,11 +37,11 @@ class WalkSteering {
   /// Returns true if both feet are at the goal, or close to it after a step that led to it
   /// (WalkStance::is_aimed): within 0.02 m and 0.5 rad, with the body within 0.25 rad.
   [[nodiscard]] bool IsCloseToGoal() const;
-  /// Returns the remaining effort in metres, as if the other foot stood beside `moved`. It is the
-  /// distance through the waypoints plus the turns, where a radian counts as 0.3 m. Close to the
-  /// goal, it is at most the effort of stepping sideways.
+  /// Returns the remaining effort of the walk in metres, as if the other foot stood beside `moved`.
+  /// It is the distance to the goal through the waypoints plus the turns, where a radian counts as
+  /// 0.3 m. Close to the goal, it is at most the effort of stepping sideways.
   [[nodiscard]] double EffortM(Foot moved, std::size_t next_waypoint) const;
-  /// Returns the distance between the positions of the body that are derived from the left and from
+  /// Returns the distance between two positions of the body: those derived from the left and from
   /// the right foot. After a step, this is the distance by which the body moves in that step.
   [[nodiscard]] double BodiesApartM() const;
 
@@ -98,9 +98,9 @@ class WalkSteering {
   const WalkRequest& walk_;
   const WalkStance& stance_;
   Body goal_;
-  // Target of the body before the last step. If the stand pose of the library is a stride, it
-  // differs from goal_: the rear foot is then on its footprint, and the last step moves the front
-  // foot ahead.
+  // Where the body should be before the last step. This differs from goal_ if the stand pose of the
+  // library is a stride: the rear foot is then already on its footprint, and the last step moves
+  // the front foot ahead.
   Body approach_;
   std::array<Foot, 2> feet_{};
 };
