@@ -43,7 +43,7 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
                ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended)
                : FeetCorrection{};
   };
-  // Both poses usually lie between the same grid points.
+  // Both poses share this cache, because they usually lie between the same grid points.
   GridCache cache(library->layout());
   if (keeps_speed) {
     const double earlier_s = time_s - kBlendStepS;
@@ -52,7 +52,7 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
   }
   EvaluateWith(cache, time_s);
   earlier_feet[0] = corrections(time_s, blended_pose);
-  // If planting has not completely faded in, the next movement starts the fade-in again.
+  // If planting has not completely faded in yet, the next movement starts to fade it in again.
   begins_planting =
       movement.feet.is_active && time_s < movement.start_offset_s + movement.feet.plant_fade_s;
   if (begins_planting) UseDisplayedAsBlended(time_s, keeps_speed);

@@ -12,7 +12,7 @@
 
 namespace stridewire {
 
-/// The displayed state of an avatar, and everything that its next movement depends on.
+/// The displayed state of an avatar, and all data on which its next movement depends.
 /// AvatarSimulation decides how an avatar moves, and AvatarReplica receives these decisions. Both
 /// contain an AvatarBody. Times are relative to the start of the movement.
 struct AvatarBody {
@@ -21,19 +21,21 @@ struct AvatarBody {
   std::shared_ptr<const MotionLibrary> library;
   Pose pose;  ///< Displayed pose without layers.
   LayerStack layers;
-  Pose layered_pose;  ///< Pose with layers; empty until the first layer is set.
-  bool has_layers = false;
+  Pose layered_pose;        ///< Pose with layers; empty until the first layer is set.
+  bool has_layers = false;  ///< True if `layered_pose` is displayed instead of `pose`.
   /// True if the current movement plants the feet. While the avatar stands still: true if its feet
   /// were planted when it came to rest.
   bool plants_feet = false;
   bool begins_planting = false;  ///< True if the next movement is the first one with planted feet.
-  Pose blended_pose;  ///< Pose without planting when the movement ended or was interrupted.
-  /// Source of the next blend: foot corrections at the end of the previous movement and, if its
-  /// velocity is kept, kBlendStepS before that. `earlier_pose` is the blended pose at the earlier
-  /// time.
+  /// Pose that the next movement blends from, without planting. Set when the movement ends or is
+  /// interrupted.
+  Pose blended_pose;
+  /// Data from which the next movement blends: the foot corrections at the end of the previous
+  /// movement and, if its velocity is kept, kBlendStepS before that. `earlier_pose` is the blended
+  /// pose at the earlier of these times.
   std::array<FeetCorrection, 2> earlier_feet;
   Pose earlier_pose;
-  Movement movement;  ///< The current movement, or the previous one while standing.
+  Movement movement;  ///< The current movement, or the previous one while standing still.
   FootLocks locks;    ///< Positions and headings of the feet when the movement began.
 
   [[nodiscard]] ConstPoseSpan DisplayedPose() const { return has_layers ? layered_pose : pose; }
@@ -58,7 +60,7 @@ struct AvatarBody {
   /// Starts the movement at `base` with the playback speed `rate`. Its weights must be set.
   void StartWeighted(const BaseFrame& base, double rate);
 
-  /// Makes the movement that was just started begin at `time_s` instead of 0.
+  /// Makes the avatar enter the movement that was just started at `time_s` instead of 0.
   void SetStartOffset(double time_s);
 
   /// Plans the feet of the movement if they are planted, and computes the difference pose that

@@ -14,11 +14,12 @@
 namespace stridewire {
 namespace {
 
-// Tolerances within which a foot is on its footprint. The documented tolerance is 1 mm. Planting is
-// 100 times as accurate.
+// Tolerances within which a foot is on its footprint. They are slightly below the documented
+// tolerance of 1 mm. Planting is 100 times as accurate.
 constexpr double kMetM = 0.9e-3;
 constexpr double kMetRad = 1e-3;
-// Number of times between landing and the end of the step at which the pose is checked.
+// Number of times, from the landing to the end of the step, at which LandingErrorFrom checks the
+// pose.
 constexpr int kChecks = 5;
 // On terrain, planting lifts a sole whose heel or toes are below the ground. A lift up to this
 // height does not count as an error.
@@ -40,8 +41,8 @@ StepMeasures MeasuresOf(const RequestTarget& target, double outward) {
   return {target.vector_m.z, outward * target.vector_m.x, target.vector_m.y, target.turn_rad};
 }
 
-// Returns a text with the length of a step, and with those of its other measures that differ from
-// the requested ones.
+// Describes a step or jump, for example "length 0.66 m, turn 0.1 rad": its length, and those other
+// measures in which the requested and the nearest movement differ.
 std::string MeasuresText(const StepMeasures& step, const FootprintError& missed) {
   constexpr double kVisible = 0.005;
   std::string text;
@@ -169,7 +170,8 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   return false;
 }
 
-// Finds the footprint closest to the missed one that the avatar can reach exactly.
+// Searches for the footprint that the avatar can reach exactly and that is closest to the requested
+// one. Returns that footprint and its distance from the requested one.
 FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
                                                 const FootprintError& missed, double start_phase,
                                                 PlanScratch& scratch) {
@@ -194,9 +196,9 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
 }
 
 // Computes where the planned step places its foot, and how far that is from the requested
-// footprint. The error in the plan is not sufficient: only the planted pose shows that a leg is too
-// short for a step up or down. If the other foot is displaced instead, its displacement is the
-// error.
+// footprint. The errors of the plan are not sufficient: only the planted pose shows that a leg is
+// too short for a step up or down. If planting displaces the standing foot instead of the moving
+// foot, the displacement of the standing foot counts as the error.
 FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();

@@ -34,7 +34,7 @@ void AvatarSimulation::AdvanceIdleMotion(double by_s, PlanScratch& scratch) {
   if (is_idling_) movement_time_s_ += by_s;
 }
 
-// Starts to settle or to idle. The motion will be advanced by `left_s` in this tick.
+// Starts the settle or the idle motion. The caller then advances it by `left_s` in this tick.
 void AvatarSimulation::BeginIdleMotion(double left_s, PlanScratch& scratch) {
   const MotionLibrary& library = *body_.library;
   if (!options_.idle_motion || !body_.plants_feet || !library.has_stand_motion()) return;

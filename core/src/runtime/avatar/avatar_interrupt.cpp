@@ -32,9 +32,9 @@ double SwingShare(double phase) {
 
 }  // namespace
 
-// Returns the movement time from which both feet are on the ground: the current time if they
-// already are, and otherwise the end of the swing. A jump that has started is always completed, and
-// so is a step that the avatar inserts for the interrupting request.
+// Returns the earliest movement time at which the movement can end with both feet on the ground:
+// the current time if both stand, and otherwise the end of the swing. Jumps and inserted steps do
+// not end before their swing, even while both feet still stand.
 double AvatarSimulation::LandingTime() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   return IsStep(group().kind) && inserted_steps_ == 0 && movement_time_s_ <= swing.release_s
@@ -42,7 +42,7 @@ double AvatarSimulation::LandingTime() const {
              : std::max(movement_time_s_, swing.land_s);
 }
 
-// Returns true if the current step ends with the feet apart, so that they must still be brought
+// Returns true if the current step ends with the feet apart, so that another step must bring them
 // together.
 bool AvatarSimulation::LandsWithFeetApart() const {
   if (!IsStep(group().kind) || !body_.movement.feet.is_active) return false;
@@ -75,7 +75,8 @@ double AvatarSimulation::StepPhase() const {
              : 1.0 + (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
 }
 
-// Returns true if the swinging foot can land on a footprint without moving back.
+// Returns true if the swinging foot can land on a footprint without moving back by more than
+// kMaxSwingBackM.
 bool AvatarSimulation::IsAheadOfSwing(const Footprint& print, double phase) const {
   const FootTrajectory& swing = body_.movement.feet.foot(MovingFoot(group().kind));
   const DVec3 path = swing.to.position_m - swing.from.position_m;
@@ -118,8 +119,8 @@ std::optional<AvatarSimulation::Redirection> AvatarSimulation::PlanRedirection(d
     STRIDEWIRE_CHECK(plan.has_value());
     return Redirection{*plan, redirected};
   }
-  // Other requests require planted feet. They wait while planting fades in, because a new fade-in
-  // would move standing feet.
+  // Requests other than steps redirect the swing only if feet are planted. They wait while planting
+  // fades in, because a new fade-in would move standing feet.
   const bool is_fading =
       movement_time_s_ < body_.movement.start_offset_s + body_.movement.feet.plant_fade_s;
   if (!body_.plants_feet || is_fading) return std::nullopt;
@@ -171,16 +172,17 @@ void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
   change_.is_redirected = is_redirected;
 }
 
-// If the request at the head of the queue allows it, replaces the current step with a step of the
-// same foot at the same phase. Otherwise, returns false. If the new step is rejected, the current
-// step continues.
+// Tries to replace the current step, for the request at the head of the queue, with a step of the
+// same foot that continues at the same phase. Returns false if that is impossible. If the new step
+// is rejected, returns true, and the current step continues.
 bool AvatarSimulation::Redirect(PlanScratch& scratch) {
   if (!may_redirect_ || IsStartDelayed() || !IsStep(group().kind) ||
       body_.plants_feet != foot_planting()) {
     return false;
   }
   const double phase = StepPhase();
-  // While both feet stand, the next movement may start at once, so the step is not redirected.
+  // While both feet stand, the next movement can start at once. Shortly before the landing, it is
+  // too late to redirect the step.
   if (phase <= 1.0 || phase >= 2.0 - kLeastSwingLeft) return false;
   // If feet are not planted, the plan depends on the position of the standing foot in the current
   // pose, which may not have been evaluated yet.
@@ -232,8 +234,8 @@ void AvatarSimulation::SwitchPlanting() {
     lock.height_m = 0.0;
     lock.normal = Vec3(0.0f, 1.0f, 0.0f);
     if (terrain != nullptr) continue;
-    // Without a terrain, the ground is at the height of the base, unless the ball is so far above
-    // or below its height on that ground that the foot must stand on another step of a staircase.
+    // Without a terrain, the ground is assumed at the height of the base. If the ball is more than
+    // a few centimetres above or below its height on that ground, the foot stands on another level.
     const double ball_height_m =
         BallPosition(skeleton, body_.pose, foot).y - rig.side(foot).ball_height_m;
     lock.print.position_m.y += GroundRise(ball_height_m - base_.position_m.y);

@@ -38,7 +38,7 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
       saved_.resize(1);
       saved_.front().pose = Pose(body_.library->skeleton().joint_count());
       Reserve(*body_.library, saved_.front().movement);
-      // A single tick may reject many requests, so the list must be able to grow.
+      // A single tick may reject many requests, so memory for all its events is reserved here.
       events_.reserve(kMaxEventsPerAdvance);
     }
   }
@@ -62,8 +62,8 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
     queue_head_ = 0;
   }
-  // The queue grows in small steps and releases its memory when it is empty. In a crowd, many
-  // queues tend to be long at the same time, but only briefly.
+  // The queue grows in small steps, and a long queue releases its memory after it has become empty.
+  // In a crowd, many queues tend to be long at the same time, but only briefly.
   if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
   if (queue_.size() == queue_.capacity()) {
     queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
@@ -82,7 +82,7 @@ int AvatarSimulation::CancelQueue() {
 
 void AvatarSimulation::DropQueue(RequestOutcome outcome) {
   std::span<const MovementRequest> requests = queue();
-  // The next Advance reports the dropped requests.
+  // The next Advance reports the dropped requests, so it is not event-free.
   if (!requests.empty()) next_event_s_ = -1.0;
   if (IsWalkInProgress()) {
     STRIDEWIRE_CHECK(!requests.empty() && requests.front().id == request_id_);
@@ -138,7 +138,8 @@ void AvatarSimulation::AddDroppedEvents() {
   }
 }
 
-// Reports the end of a walk that was dropped during its last step. The step has just ended.
+// If the current walk was dropped while its last step was in progress, reports that it has ended.
+// Call it when that step has ended.
 void AvatarSimulation::EndDroppedWalk() {
   if (walk_outcome_ == RequestOutcome::kNone) return;
   AddEvent({.type = AvatarEventType::kDropped,

@@ -14,7 +14,7 @@
 namespace stridewire {
 namespace {
 
-// AdvanceAll prefetches the replica at this distance.
+// AdvanceAll prefetches the replica that is this many places ahead in the list.
 constexpr std::size_t kPrefetched = 4;
 
 // Limits on the numbers in a record, in metres, seconds or radians, and on weights.
@@ -203,7 +203,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& 
 }
 
 void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch) {
-  // Each part of the record is checked before it is applied, because changes cannot be undone.
+  // Each part of the record is checked before it is applied, because its effects cannot be undone.
   Movement& movement = body_.movement;
   const bool has_left = (flags & record::kLeft) != 0;
   const bool has_begun = (flags & record::kMoves) != 0;
@@ -338,7 +338,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
 void AvatarReplica::SkipTicks(std::uint64_t ticks, double length_s) {
   STRIDEWIRE_CHECK(is_known_ && is_moving_ && !is_time_set_ && !may_have_layers_);
   ahead_count_ = 0;
-  // Summed tick by tick, as in AdvanceAll.
+  // The time is summed tick by tick, as in AdvanceAll, so that rounding gives the same bits.
   for (std::uint64_t tick = 0; tick < ticks; ++tick) movement_time_s_ += length_s;
 }
 
@@ -385,7 +385,8 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, const T
           std::array<Vec3*, SoaPose::kLanes> roots_m;
           std::array<Quat*, SoaPose::kLanes> rotations;
           std::size_t lanes = 0;
-          // Longer runs come before shorter ones.
+          // Items are sorted by length, longest first, so all items before the first one without
+          // this pose have it.
           for (; lanes < items.size() && pose < items[lanes].count; ++lanes) {
             AvatarReplica& replica = *batch[items[lanes].tag];
             const auto at = static_cast<std::size_t>(pose);

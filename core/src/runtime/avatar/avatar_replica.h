@@ -34,17 +34,18 @@ class ReplicaEvaluator {
 /// thread-safe; one owner. Allocates only in its constructor.
 ///
 /// For each tick, call Apply with the record of the tick, if there is one. Then call AdvanceAll
-/// with the length of the avatar's tick.
+/// with the tick length of the simulation.
 class AvatarReplica {
  public:
   /// A tick of AdvanceAll.
   struct Tick {
-    double length_s = 0.0;     ///< Must be the same until all replicas receive new states.
-    std::uint64_t number = 0;  ///< Must increase by 1 from tick to tick.
+    /// Length of the tick in seconds. Must be the same until all replicas receive new states.
+    double length_s = 0.0;
+    std::uint64_t number = 0;  ///< Number of the tick. Must increase by 1 from tick to tick.
     bool has_poses = true;     ///< False: poses of this tick are not needed.
     /// Expected number of ticks between poses. Poses of other ticks are possible, but cost more.
     int ticks_apart = 1;
-    /// True: only poses with layers are needed, so movements without layers are not evaluated.
+    /// True: only poses with layers are needed, so replicas without layers are not evaluated.
     bool only_layered = false;
   };
 
@@ -65,8 +66,8 @@ class AvatarReplica {
 
   /// Advances replicas by one tick and evaluates their poses if the tick has poses. All must have
   /// the same library, and each may occur only once. Replicas without a known state are skipped. A
-  /// movement that does not change is evaluated for several ticks at once, which reads the library
-  /// less often. Pass the replicas in the same order in every tick, because their positions in the
+  /// movement that does not change is evaluated for several ticks at once, so that the library is
+  /// read less often. Pass replicas in the same order in every tick, because their positions in the
   /// list and the number of the tick determine in which ticks they are evaluated.
   static void AdvanceAll(std::span<AvatarReplica* const> replicas, const Tick& tick,
                          ReplicaEvaluator& evaluator);
@@ -86,8 +87,8 @@ class AvatarReplica {
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
-  /// Changes whenever a record begins or sets a movement. While it stays the same, the movement
-  /// does not change.
+  /// A number that changes whenever a record begins, ends or sets a movement. While it stays the
+  /// same, the movement does not change.
   [[nodiscard]] std::uint32_t movement_number() const { return movement_number_; }
   /// Time at which the previous movement ended when this one began. Negative if the movement did
   /// not begin at the end of another one.
@@ -108,7 +109,7 @@ class AvatarReplica {
 
   void ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch);
   void ReadState(unsigned flags, Reader& reader);
-  /// Returns true if the pose of this tick has been evaluated.
+  /// Returns true if the pose of the current tick has already been evaluated.
   [[nodiscard]] bool HasAheadPose() const {
     return ahead_tick_ % ahead_ticks_apart_ == 0 && ahead_tick_ / ahead_ticks_apart_ < ahead_count_;
   }
@@ -124,15 +125,15 @@ class AvatarReplica {
   bool is_known_ = false;
   bool is_moving_ = false;
   bool is_idle_ = false;
-  // True if the last record set the movement time (or the layers) of the next tick, so AdvanceAll
-  // must not advance it.
+  // True if the last record set the movement time (or the layers) of the next tick. The next
+  // AdvanceAll then must not advance them.
   bool is_time_set_ = false;
   bool are_layers_set_ = false;
   bool may_have_layers_ = false;  // False: neither the body nor its displayed pose has layers.
-  // Poses of the movement, without layers, for times that are ahead_ticks_apart_ ticks apart.
+  // Number of poses that have been evaluated ahead, without layers, and the ticks between them.
   std::uint32_t ahead_count_ = 0;
   std::uint32_t ahead_ticks_apart_ = 1;
-  std::uint32_t ahead_tick_ = 0;  // Number of ticks since the tick of the first of these poses.
+  std::uint32_t ahead_tick_ = 0;  // Number of ticks since the first of the poses evaluated ahead.
   std::vector<Quat> ahead_rotations_;  // [kPosesAhead][joint]
   std::array<Vec3, kPosesAhead> ahead_roots_m_ = {};
   double previous_end_s_ = -1.0;

@@ -20,13 +20,14 @@ namespace {
 // finished, the end of a dropped walk, the end of a walk or a rejection, and the start of the next
 // movement.
 constexpr std::size_t kEventReserve = 7;
-// A tick usually has at most three events: finished, started and foot strike. The list grows if
-// there are more.
+// Number of events for which memory is reserved at construction. A tick usually has at most three
+// events: finished, started and foot strike.
 constexpr std::size_t kUsualEvents = 3;
 // Phase at which a jump that interrupts another movement starts. The blend from the previous pose
 // replaces the skipped part of the crouch.
 constexpr double kJumpStartPhase = 0.25;
-// A foot that points further away from the heading than this moves next.
+// If the angle between a standing foot and the heading of the avatar exceeds this, the foot counts
+// as twisted (IsTwisted), and it should move next.
 constexpr double kTwistedRad = 0.2;
 
 }  // namespace
@@ -199,7 +200,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
   const auto advance_clock = [&] {
-    // If no time has passed, rounding can make the difference smaller than time_s_ by one bit. The
+    // If no time has passed, rounding can make end_s - left_s smaller than time_s_ by one bit. The
     // clock must not run backwards.
     time_s_ = std::max(time_s_, end_s - left_s);
   };
@@ -235,8 +236,8 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     if (!may_change || !StartNext(scratch)) break;
   }
   STRIDEWIRE_CHECK(time_s_ <= end_s);
-  // If idle motion continues, it advances by the whole tick at once, as replicas advance it. A sum
-  // of two parts of a tick may differ in the last bit.
+  // If idle motion continues, it advances by the whole tick at once, as in replicas. A sum of two
+  // parts of the tick could differ from that in the last bit.
   if (!is_moving_) AdvanceIdleMotion(is_idling_ ? dt_s : left_s, scratch);
   time_s_ = end_s;
   change_.idle_changed = idle() != std::exchange(was_idle_, idle());
@@ -308,7 +309,8 @@ void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch
   } else if (path.plan) {
     const MovementRequest taken = request;
     PopQueue();
-    // A jump that interrupts a walk needs less preparation, because the body is already moving.
+    // A jump that interrupts a walk starts at a later phase, because a moving body needs less
+    // preparation.
     const double start_phase =
         is_hurried && body_.library->group(path.plan->group).kind == MovementKind::kJump
             ? kJumpStartPhase
@@ -362,7 +364,7 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
     is_walk_step_ = true;
     return;
   }
-  // Read before PopQueue, which may reset walk_pace_.
+  // The speed is read before PopQueue, because PopQueue may reset walk_pace_.
   const double speed_m_s = walk_pace_.mean_m_s();
   const std::uint64_t id = PopQueue();
   walk_ = {};
@@ -389,7 +391,8 @@ DVec3 AvatarSimulation::StandingPosition(Foot foot) const {
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
-// Returns true if a foot points far away from the heading, because the body has turned over it.
+// Returns true if the footprint of a foot deviates far from the heading of the avatar, because the
+// body has turned while the foot stood.
 bool AvatarSimulation::IsTwisted(Foot foot) const {
   if (!body_.plants_feet) return false;
   const double print_rad = body_.locks[static_cast<std::size_t>(foot)].print.heading_rad;
@@ -409,9 +412,9 @@ double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   return GroundRise(options_.terrain->HeightAt(planted.x, planted.z) - stands.y);
 }
 
-// Returns the footprint that a step by length requests. If the request does not specify the side,
-// the feet end as far apart sideways as in a walk. If they end side by side, they end as far apart
-// as in the stand pose.
+// Returns the footprint of a step that is requested by length, side and turn. If the request does
+// not specify the side, the feet end as far apart sideways as in a walk or, if they end side by
+// side, as in the stand pose.
 FootprintRequest AvatarSimulation::FootprintOf(const StepRequest& step) const {
   STRIDEWIRE_CHECK(step.foot.has_value());
   const LocomotionProfile& profile = body_.library->locomotion_profile();
@@ -534,9 +537,9 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
             .clamped = is_met ? false : plan.clamped});
 }
 
-// Keeps straight steps on the line of the walk. In groups without a sideways parameter, the
-// examples determine the position of the base only along the walking direction. Sideways, the base
-// follows the body.
+// Moves the base sideways so that straight steps stay on the line of the walk. In groups without a
+// sideways parameter, the examples determine the position of the base only along the walking
+// direction. Sideways, the base follows the body.
 void AvatarSimulation::KeepToLine(const DVec3& line_m) {
   if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
   const double heading_rad = body_.movement.base.heading_rad;

@@ -25,14 +25,15 @@
 
 namespace stridewire {
 
-/// Changes of an avatar's movement during an Advance. Movement records are derived from them.
+/// Changes of an avatar's movement during an Advance, from which movement records are derived.
+/// Members with "left" refer to the previous movement, which ended or was interrupted.
 struct AvatarChange {
   /// True if a change record cannot express the changes, so that the whole state must be sent.
   bool needs_state = false;
   bool has_left = false;      ///< True if the previous movement ended or was interrupted.
   bool has_begun = false;     ///< True if a movement began and is still in progress.
   bool has_layers = false;    ///< True if SetLayer was called.
-  bool idle_changed = false;  ///< idle() changed.
+  bool idle_changed = false;  ///< True if idle() has changed.
   /// True if the previous movement was completed, false if it was interrupted.
   bool is_left_at_end = false;
   /// True if the new movement began during the swing of the previous one.
@@ -49,7 +50,7 @@ struct AvatarChange {
 /// Returns the reason of a kDropped event: a sentence without a full stop.
 [[nodiscard]] const char* DropReason(RequestOutcome outcome);
 
-/// Simulates one avatar: base frame, queue of requests, current movement, displayed pose.
+/// Simulates one avatar: its base frame, queue of requests, current movement and displayed pose.
 ///
 /// Time is an argument; only Advance moves the avatar. The same library, start, requests and time
 /// steps give the same pose bytes on every machine. Not thread-safe; one owner.
@@ -75,8 +76,8 @@ class AvatarSimulation {
   /// not planted; kLimitExceeded if the queue is full.
   ///
   /// `start_delay_s` (>= 0) delays the start. A standing avatar begins the request after this delay
-  /// at the earliest, and a moving avatar is not interrupted earlier. If the request follows
-  /// another movement, it is not delayed. An existing delay is not extended.
+  /// at the earliest, and a moving avatar is not interrupted earlier. If the request begins when
+  /// another movement ends, it is not delayed. A delay of an earlier request is not extended.
   [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
 
   /// Drops the requests that have not started and returns their number. The current movement
@@ -117,14 +118,14 @@ class AvatarSimulation {
   /// allocates scratch memory. For many avatars, use AdvanceAll.
   void Advance(double dt_s);
 
-  /// Advances many avatars of one library and evaluates their poses together, which is several
-  /// times as fast as Advance for each of them. No bit of a pose depends on the other avatars.
+  /// Advances many avatars of one library and evaluates their poses together. This is several times
+  /// as fast as Advance for each of them. No bit of a pose depends on the other avatars.
   static void AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
                          PlanScratch& scratch, SoaPoseEvaluator& evaluator);
 
   /// Like AdvanceAll, but without poses, for callers that evaluate poses themselves (SampleRun).
-  /// pose() is outdated until UpdatePose. `eventful` receives the indices in `avatars` of those
-  /// that are not event-free afterwards, in increasing order.
+  /// pose() is outdated until UpdatePose is called. `eventful` receives the indices in `avatars` of
+  /// those that are not event-free afterwards (is_event_free), in increasing order.
   static void AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
                             PlanScratch& scratch, std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
@@ -135,7 +136,7 @@ class AvatarSimulation {
   /// Displayed pose in world space.
   [[nodiscard]] ConstPoseSpan pose() const { return body_.DisplayedPose(); }
   [[nodiscard]] const LayerStack& layers() const { return body_.layers; }
-  /// Everything that the displayed pose and the next movement depend on. It corresponds to pose()
+  /// All data on which the displayed pose and the next movement depend. It corresponds to pose()
   /// until the next Advance, Teleport or SetLayer.
   [[nodiscard]] const AvatarBody& body() const { return body_; }
   /// Returns the changes of the last Advance. They include calls of Teleport and SetLayer before
@@ -160,9 +161,9 @@ class AvatarSimulation {
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// Seconds since construction.
   [[nodiscard]] double time_s() const { return time_s_; }
-  /// Changes whenever a movement or idle motion starts or ends, and on Teleport. While it stays the
-  /// same, the displayed pose without layers follows from displayed_movement() and
-  /// movement_time_s().
+  /// A number that changes whenever a movement or idle motion starts or ends, and on Teleport.
+  /// While it stays the same, displayed_movement() and movement_time_s() determine the displayed
+  /// pose without layers.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// True if the avatar moves or idles, has no layers, and the last Advance produced neither events
   /// nor changes. In this case, time_s(), revision(), movement_time_s() and idle() are in one cache
@@ -217,7 +218,8 @@ class AvatarSimulation {
   [[nodiscard]] bool IsWalkInProgress() const {
     return is_moving_ && is_walk_step_ && walk_outcome_ == RequestOutcome::kNone;
   }
-  // Returns how the request of the current movement ends when the movement ends.
+  // Returns the outcome of the current movement's request if the movement ends now. kNone if the
+  // request continues or if there is none.
   [[nodiscard]] RequestOutcome MovementOutcome(bool is_cut_short) const {
     if (is_walk_step_ || request_id_ == 0) return RequestOutcome::kNone;
     return is_cut_short ? RequestOutcome::kReplaced : RequestOutcome::kCompleted;
@@ -295,22 +297,23 @@ class AvatarSimulation {
   // At most one of these is true: a movement is in progress, or a requested stand is in progress.
   bool is_moving_ = false;
   bool is_in_stand_ = false;
-  bool is_idling_ = false;   // True while body_.movement is the settle or idle motion.
-  bool is_settled_ = false;  // True if the avatar stands in the stand pose.
-  bool is_idle_reported_ = false;
-  bool was_idle_ = false;  // Value of idle() after the previous Advance.
+  bool is_idling_ = false;         // True while body_.movement is the settle or idle motion.
+  bool is_settled_ = false;        // True if the avatar stands in the stand pose.
+  bool is_idle_reported_ = false;  // True if a kIdle event was sent since the last request.
+  bool was_idle_ = false;          // Value of idle() after the previous Advance.
   // True if the last step left the feet apart, so that a closing step must precede a stand.
   bool is_walking_ = false;
   // True if the request at the head of the queue does not wait for the end of the movement.
   bool interrupts_ = false;
-  // True until the avatar has tried to redirect the current step for that request.
+  // True until the avatar has tried to redirect the current step for the interrupting request.
   bool may_redirect_ = false;
   bool is_exact_ = false;      // True if the current step leads to a requested footprint.
   bool is_walk_step_ = false;  // True if the current or last movement is a step of a walk.
-  // Outcome of that walk if it was dropped. It is reported when the step ends.
+  // Outcome of a walk that was dropped during its current step, else kNone. It is reported when the
+  // step ends.
   RequestOutcome walk_outcome_ = RequestOutcome::kNone;
-  bool is_stand_cut_short_ = false;  // True if a request has ended the current stand.
-  // Number of successive inserted steps, including the current movement.
+  bool is_stand_cut_short_ = false;  // True if a request has ended the current stand early.
+  // Number of successive steps that the avatar inserted, including the current movement.
   int inserted_steps_ = 0;
   std::uint64_t movement_number_ = 0;  // Number of movements that have begun.
   double start_not_before_s_ = 0.0;    // Avatar time before which no queued request may start.
@@ -323,8 +326,8 @@ class AvatarSimulation {
   AvatarChange change_;           // Changes during the last Advance.
   AvatarChange next_change_;      // Changes since the last Advance. The next Advance reports them.
   std::uint64_t request_id_ = 0;  // Request id of the current movement or stand.
-  double stand_left_s_ = 0.0;
-  AvatarEvent started_;
+  double stand_left_s_ = 0.0;     // Remaining time of the current requested stand.
+  AvatarEvent started_;           // The last kStarted event.
   // Height of the base frame after the movement minus its height before the movement.
   double ground_rise_m_ = 0.0;
   // State that is restored if a planned movement is rejected. The first request for exact placement
@@ -337,7 +340,7 @@ class AvatarSimulation {
   std::vector<SavedState> saved_;
 
   FootState stand_feet_;  // Relative position of the feet in the library's stand pose.
-  FootState feet_;
+  FootState feet_;        // Relative position of the feet when the last movement ended.
   Foot last_moved_ = Foot::kRight;
   // Group of the previous movement. After a stand, the number of groups.
   std::size_t last_group_ = 0;

@@ -8,12 +8,13 @@
 namespace stridewire {
 namespace {
 
-// Minimum distance by which a second or third closing step must bring the feet closer together.
+// A closing step after another inserted step must bring the feet closer together by at least this.
 constexpr double kClosingGainM = 0.03;
-// If a step ends this close to the stand pose, it needs no correction by planting.
+// If the forward distance between the feet at the end of a step differs from that of the stand pose
+// by at most this, the step needs no correction by planting.
 constexpr double kClosedM = 0.03;
-// An avatar does not bring its feet together if their heights would then differ by more than this
-// and by more than they do now. An example is a stone with room for only one foot.
+// An avatar brings its feet together only if their heights then differ by at most this, or by no
+// more than they do now. It does not do so if one foot stands on a high, small stone, for example.
 constexpr double kMaxStandClimbM = 0.15;
 
 // Returns the forward distance between the feet at the end of a planned step.
@@ -58,7 +59,8 @@ std::optional<RequestPlan> AvatarSimulation::PlanClosingStep() const {
   return second && miss_of(*second) <= largest_miss_m ? plan : std::nullopt;
 }
 
-// Returns where the other foot has to be so that the feet are together. `fixed` stays in its place.
+// Returns the place beside the foot `fixed` where the other foot must land to bring the feet
+// together.
 DVec3 AvatarSimulation::PlaceBeside(Foot fixed) const {
   const DVec3 vector = stand_feet_.Vector(OtherFoot(fixed));
   return StandingPosition(fixed) + RotateYaw(base_.heading_rad, DVec3(vector.x, 0.0, vector.z));

@@ -149,7 +149,7 @@ void AppendState(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
 
 std::size_t MaxRecordBytes(const MotionLibrary& library) {
   // The plan, foot locks, corrections and four layers take about 1,700 bytes. A record contains at
-  // most three poses, or one pose and its velocity.
+  // most three poses of 16 bytes per joint, or one pose and its velocity.
   return 2000 + 48 * static_cast<std::size_t>(library.skeleton().joint_count()) +
          4 * static_cast<std::size_t>(library.max_example_count());
 }

@@ -24,10 +24,10 @@ enum Flag : std::uint16_t {
   kLeftAtEnd = 1 << 6,  // The previous movement was completed, so its end time is omitted.
   // The previous movement was redirected in mid-swing. The foot locks remain unchanged.
   kIsRedirected = 1 << 7,
-  // Argument of AvatarBody::CaptureBlendSource for the previous movement.
+  // Argument `keeps_speed` of AvatarBody::CaptureBlendSource for the previous movement.
   kLeftKeepsSpeed = 1 << 8,
-  // Argument of AvatarBody::BlendIn. In the state of a standing avatar: the next movement keeps the
-  // speed of the previous one.
+  // Argument `keeps_speed` of AvatarBody::BlendIn for the new movement. In the state of a standing
+  // avatar: the next movement keeps the speed of the previous one.
   kKeepsSpeed = 1 << 9,
   // Flags for a movement that began:
   kIsEntered = 1 << 10,  // The record contains Movement::start_offset_s, which is not 0.

@@ -9,7 +9,8 @@ namespace {
 constexpr double kTickS = 1.0 / 30.0;
 // Maximum duration of a measured walk: one minute.
 constexpr int kMaxTicks = 60 * 30;
-// Lengths of walks that are long enough for steady strides between the first and the last steps.
+// Lengths of the measured walks. They are long enough for steady strides between the first and the
+// last steps.
 constexpr double kFastWalkM = 8.0;
 constexpr double kSlowWalkM = 3.0;
 
