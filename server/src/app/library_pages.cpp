@@ -126,8 +126,8 @@ class MovementPreview {
     }
   }
 
-  // Returns the scaled distance between the parameters and the hull of the examples. Writes the
-  // nearest point of the hull to `nearest`.
+  // Returns the scaled distance between the parameters and the hull of the examples, which is
+  // enlarged by the fraction `growth`. Writes the nearest point of the hull to `nearest`.
   double Project(const ParameterValues& p, double growth, ParameterValues& nearest) const {
     const auto d = static_cast<std::size_t>(p.count);
     nearest = p;

@@ -76,8 +76,8 @@ void Shard::CloseConnections() {
   STRIDEWIRE_CHECK(!thread_.joinable());
   tick_timer_.cancel();
   housekeeping_timer_.cancel();
-  // The pending read of a closed WebSocket belongs to the io_context in which it was created. A
-  // connection that was adopted while handlers ran is closed in the next round.
+  // Pending reads must end here: the read of a closed WebSocket belongs to the io_context in which
+  // it was created. A connection that a handler adopts meanwhile is closed in the next round.
   context_.restart();
   do {
     for (const auto& weak : connections_) {

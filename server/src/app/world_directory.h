@@ -27,8 +27,8 @@ class WorldDirectory {
         terrains_(terrains),
         encoder_({config.limits.max_control_bytes, config.limits.max_bulk_bytes}) {}
 
-  /// Adds a member to a world and creates the world if necessary. Fails with kInvalidArgument if
-  /// the name is invalid, kNoSuchWorld if the world is not configured and open_worlds is false, or
+  /// Adds a member to a world and creates the world if necessary. `name` must be a valid name of a
+  /// world. Fails with kNoSuchWorld if the world is not configured and open_worlds is false, or
   /// kLimitReached if there are max_worlds worlds.
   [[nodiscard]] Outcome<std::shared_ptr<World>> Join(std::string_view name);
 

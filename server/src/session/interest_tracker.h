@@ -23,11 +23,12 @@ class InterestTracker {
   InterestTracker(int shard, const Sessions& sessions, Broadcast broadcast);
 
   /// Must be called when a session needs more or less data of `world` than before. If the combined
-  /// interest has changed, sends it at once. Changes of selected avatars and regions are delayed.
+  /// interest has changed, sends it at once. Changes of selected avatars and regions are delayed
+  /// until SendChangedSelections.
   void Update(const std::shared_ptr<World>& world);
 
-  /// Must be called when a session has changed only its selected avatars or its region. They are
-  /// sent with the next SendChangedSelections, because many sessions may change in one tick.
+  /// Must be called when a session has changed only its selected avatars or its region. The next
+  /// SendChangedSelections sends the change, because many sessions may change in one tick.
   void SelectionChanged(WorldId world) { changed_selections_.insert(world); }
   void SendChangedSelections();
 

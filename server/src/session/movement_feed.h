@@ -28,14 +28,14 @@ class MovementFeed {
   explicit MovementFeed(std::shared_ptr<World> world) : world_(std::move(world)) {}
 
   /// Selects the avatars (ascending ids), or all avatars of the shard if `avatars` is nullopt. New
-  /// avatars need states. A feed that has covered all avatars stays that way; the client then
-  /// ignores the avatars that it does not need.
+  /// avatars need states. Once a feed has covered all avatars, it always covers them; the client
+  /// then ignores the avatars that it does not need.
   void SetAvatars(std::optional<std::vector<AvatarId>> avatars);
 
   /// True if the client receives every step unchanged.
   [[nodiscard]] bool covers_all() const { return covers_all_; }
   /// Returns the part of `step` that concerns the selected avatars. Also reports deselected avatars
-  /// as gone until the message has `max_bytes`. The others are reported with the next step.
+  /// as gone, up to a message size of `max_bytes`. The rest are reported with the next step.
   [[nodiscard]] protocol::Movements Select(const protocol::Movements& step, std::size_t max_bytes);
 
   /// Must be called when movements were dropped: the client's avatars are then invalid.

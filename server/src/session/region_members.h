@@ -17,14 +17,14 @@ namespace stridewire::server {
 /// avatars of one shard.
 ///
 /// A region has rings with different intervals and possibly different modes. Each mode has its own
-/// deliveries; a delivery is due for the avatars in the rings of its mode:
+/// deliveries. From a delivery, the client receives the avatars in the rings of its mode ("due"):
 ///
 ///        centre  compact       8 m   reduced         20 m   root    radius  + leave_m
 ///   rows   |------- 3 -- 9 -----|---- 1 -------- 4 --|----- 7 -------|--------|
 ///   due    [3, 9]                [1, 4]               [7]
 ///
-/// An avatar enters the region with the first delivery that contains its pose, and leaves it with
-/// the first delivery of any mode. Each change is thus reported once. A move from one ring to
+/// An avatar is reported as entered with the first delivery that contains its pose, and as left
+/// with the next delivery of any mode. Each change is thus reported once. A move from one ring to
 /// another is not reported.
 class RegionMembers {
  public:

@@ -98,7 +98,7 @@ void Session::Fail(StatusCode code, std::string text, protocol::Seq seq) {
   context_.Send(
       protocol::ErrorNotice{.code = code, .text = std::move(text), .fatal = true, .seq = seq});
   const auto connection = context_.connection;
-  // If a new connection replaces this one, the session is not detached in between.
+  // If a new connection replaces this one at once, the session does not become detached.
   if (code == StatusCode::kReplaced) {
     context_.connection = nullptr;
     context_.host.metrics().connections_closed.Add();
@@ -131,7 +131,7 @@ void Session::Drain() {
     End();
     return;
   }
-  // Pending commands are answered first. Housekeep calls this function again.
+  // Pending commands must be answered first. Housekeep calls this function again later.
   if (commands_.pending_count() > 0) return;
   // This is not a Goodbye, so the client may reconnect as soon as a server is available.
   Fail(StatusCode::kShuttingDown, "the server is shutting down");
@@ -283,7 +283,7 @@ void Session::Inspect(const protocol::InspectAvatar& message) {
 }
 
 void Session::OnInspected(const protocol::AvatarState& state) {
-  // The request may belong to an ended session with the same id.
+  // The request may belong to an ended session, which this session replaces under the same id.
   if (pending_inspections_ == 0) return;
   --pending_inspections_;
   context_.Send(state);

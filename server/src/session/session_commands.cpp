@@ -25,7 +25,7 @@ constexpr const char* kNotJoinedText = "this session has not joined that world";
 // index in the command.
 template <typename Item, typename Part>
 void Distribute(std::vector<Item>&& items, std::vector<Part>& parts) {
-  // Consecutive ids are distributed evenly over the shards.
+  // Consecutive ids are distributed evenly over the shards, so parts have about the same size.
   for (Part& part : parts) part.items.reserve(items.size() / parts.size() + 1);
   const int shard_count = static_cast<int>(parts.size());
   std::uint32_t index = 0;
@@ -50,7 +50,7 @@ std::string SpeedNote(const WalkSpeeds& speeds, const std::vector<protocol::Requ
 // Upper bound for the size of a refused item in a Reply.
 constexpr std::size_t kReplyItemBytes = 256;
 // This many heights or boxes of a terrain count as one item. The largest terrain then uses half of
-// the default burst.
+// the default request_burst.
 constexpr std::size_t kNumbersPerItem = 32;
 
 }  // namespace
@@ -213,7 +213,7 @@ void SessionCommands::Execute(protocol::JoinWorld&& command) {
 }
 
 void SessionCommands::OnJoined(Seq seq, Outcome<std::shared_ptr<World>>&& outcome) {
-  // The command may belong to an ended session with the same id.
+  // The command may belong to an ended session, which this session replaces under the same id.
   if (!pending_.contains(seq)) {
     if (outcome) context_.host.SendToServer(LeaveNotice{(*outcome)->id});
     return;

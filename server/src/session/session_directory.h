@@ -43,7 +43,7 @@ class SessionDirectory {
 
   const Limits limits_;
   std::vector<int> shard_counts_;
-  std::map<std::string, Entry> by_token_;  // The keys contain the bytes of the tokens.
+  std::map<std::string, Entry> by_token_;  // The key is the bytes of the session's token.
   std::map<SessionId, std::string> tokens_;
   std::map<std::string, int> address_counts_;
 };

@@ -67,7 +67,7 @@ void SessionStream::EndMovementFeeds(WorldId world) {
 void SessionStream::RequestStates() {
   if (context_.connection == nullptr) return;
   const std::size_t waiting = context_.connection->queue().movement_bytes();
-  // States must leave most of the budget to movements.
+  // States may fill only a small part of the buffer; the rest is for movements.
   const std::size_t max_waiting = context_.host.config().limits.control_buffer_bytes / 16;
   for (auto& [key, feed] : movement_feeds_) {
     if (feed.is_lost() && waiting == 0) feed.Restart();

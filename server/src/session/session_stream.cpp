@@ -166,7 +166,7 @@ void SessionStream::SendPoses(const PoseDelivery& delivery, std::vector<SharedFr
 
 double SessionStream::GatherTime() const {
   if (context_.host.shard_count() == 1) return 0.0;
-  // No batch waits until the next tick.
+  // The limit of half a tick ensures that batches are sent before those of the next tick.
   return std::min(context_.host.config().limits.websocket_gather_s,
                   0.5 / context_.host.config().tick_hz);
 }

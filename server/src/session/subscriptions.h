@@ -53,7 +53,7 @@ class Subscriptions {
   void RepeatEmptyBatches();
 
   [[nodiscard]] bool WantsEvents(WorldId world) const;
-  /// True if there is a subscription or a region for this world.
+  /// True if there is a subscription to this world.
   [[nodiscard]] bool ObservesWorld(WorldId world) const;
   [[nodiscard]] bool HasRegion(WorldId world) const;
   [[nodiscard]] std::size_t region_count() const;

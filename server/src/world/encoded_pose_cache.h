@@ -24,7 +24,7 @@ struct PoseScratch {
   SoaPoseEvaluator evaluator;  ///< Evaluates up to EncodedPoseCache::kMaxTicksAhead poses per run.
   PlanScratch plan;            ///< Scratch memory for starting movements.
   EvaluationBatcher batcher;
-  SoaPose stored;  ///< Poses that were passed to EncodedPoseCache::Store.
+  SoaPose stored;  ///< Poses from EncodedPoseCache::Store that are not encoded yet.
   Pose pose;
   static constexpr std::size_t kMaxModes = 4;
   std::array<protocol::CompactCodec::Block, kMaxModes> blocks;
@@ -53,8 +53,8 @@ struct PoseScratch {
 ///                     +-----------------------------------------------+
 ///
 /// Release (the avatar was removed) and Forget (SetModes, or the crowd became large) lead from
-/// empty, timed and constant to empty. Neither may happen while a slot is scheduled. An avatar with
-/// animation layers stores a pose in every step, in state empty as well.
+/// empty, timed and constant to empty. Neither may happen while a slot is scheduled. Store (one
+/// step) also leads from empty to timed. It is called in every step of an avatar with layers.
 ///
 ///   empty       The slot contains no pose.
 ///   scheduled   FinishStep will evaluate the poses of a movement. Until then, the movement must
@@ -88,8 +88,9 @@ class EncodedPoseCache {
   /// If there are more avatars than this, the ring has only kMaxTicksAhead / 2 planes, to save
   /// memory.
   static constexpr std::size_t kLargeCrowd = 32'768;
-  /// Returns the number of phases for `avatar_count` avatars. A small crowd has fewer phases,
-  /// because otherwise the avatars of one phase would not fill the SIMD lanes.
+  /// Returns the number of phases for `avatar_count` avatars: each group has its turn once in this
+  /// many steps. A small crowd has fewer phases, because otherwise the avatars of one phase would
+  /// not fill the SIMD lanes. A large crowd has one phase per plane of its smaller ring.
   [[nodiscard]] static constexpr std::size_t PhasesOf(std::size_t avatar_count) {
     return avatar_count < 2048 || avatar_count > kLargeCrowd ? kMaxTicksAhead / 2 : kMaxTicksAhead;
   }
@@ -187,7 +188,7 @@ class EncodedPoseCache {
     protocol::PoseMode mode;
     const protocol::CompactCodec* codec;
     std::size_t offset;  // Position of the mode's bytes within the bytes of a slot.
-    std::size_t pieces;  // Argument of CompactCodec::Block::StreamBytes.
+    std::size_t pieces;  // Pieces of 16 bytes that CompactCodec::Block::StreamBytes writes.
   };
   // State of one slot; read in every tick.
   struct SlotState {

@@ -20,7 +20,7 @@ protocol::CurrentMovement CurrentMovementOf(const AvatarSimulation& avatar,
                                     .extrapolated = event.extrapolated,
                                     .clamped = event.clamped};
   const Movement* movement = avatar.movement();
-  if (movement == nullptr) return current;  // The current movement is a requested stand.
+  if (movement == nullptr) return current;  // A requested stand has no Movement.
   current.keytimes_s = movement->warp.Keytimes();
   current.generic_time = std::clamp(movement->warp.GenericTimeAt(avatar.movement_time_s()), 0.0,
                                     static_cast<double>(movement->warp.interval_count()));

@@ -147,7 +147,7 @@ struct RegionFilter {
   double outer_m = 0.0;
   double inner_m = 0.0;  ///< Avatars at this distance or nearer are excluded. 0: none are excluded.
   /// True if other rings of the same region use other modes. Deliveries are then needed even if no
-  /// avatar is in this ring, because their positions show which avatars have left the region.
+  /// avatar is in this ring, because the positions in them show which avatars have left the region.
   bool is_one_of_several = false;
   bool operator==(const RegionFilter&) const = default;
 };

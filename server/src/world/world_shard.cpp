@@ -161,7 +161,8 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
   auto it = avatars_.end();
   for (const RequestPart::Item& item : part.items) {
     const protocol::RequestItem& asked = item.request;
-    // The items of a large command are usually sorted by avatar id.
+    // The items of a large command are usually sorted by avatar id, so the next avatar is tried
+    // before a search.
     if (it != avatars_.end() && it->first != asked.avatar) ++it;
     if (it == avatars_.end() || it->first != asked.avatar) it = avatars_.find(asked.avatar);
     if (it == avatars_.end()) {
@@ -436,8 +437,8 @@ void WorldShard::RecordMovements() {
     add(id, is_new ? protocol::kPoseDiscontinuity : 0);
   }
   const std::size_t parts = movements_.size() - first;
-  // This happens only if the frame limit is far below the default. Clients then detect a missing
-  // step and request new states.
+  // There are too many parts only if the frame limit is far below the default. Clients then detect
+  // a missing step and request new states.
   if (parts > protocol::kMaxBatchParts) {
     metrics_.pose_errors.Add(ordered.size());
     movements_.resize(first);
@@ -480,7 +481,7 @@ StatesResult WorldShard::States(const StatesRequest& request, protocol::Encoder&
       result.next = id;
       return;
     }
-    // The movements of this tick may also contain a new avatar. Its state is the same.
+    // If an avatar is new, the movements of this tick also contain its state, which is the same.
     AppendState(entry.avatar, message.records);
     message.avatars.push_back(id);
     message.flags.push_back(0);

@@ -38,8 +38,8 @@ struct WorldShardDef {
   const TickClock& clock;  ///< Clock of the ticks; copied.
   AvatarBudget& budget;
   ThreadMetrics& metrics;
-  /// Scratch memory of the world's library and of this thread. If null, the WorldShard allocates
-  /// its own.
+  /// Scratch memory for the world's library, which other worlds of this thread may share. If null,
+  /// the WorldShard allocates its own.
   std::shared_ptr<PoseScratch> scratch;
 };
 
@@ -145,7 +145,7 @@ class WorldShard {
   };
   // Encodes the poses of these rows into the cache, and sets `cached_poses_`.
   void CachePoses(std::span<const std::uint32_t> rows);
-  // Evaluates the poses of these rows in their avatars.
+  // Updates AvatarSimulation::pose of the avatars in these rows.
   void EvaluatePoses(std::span<const std::uint32_t> rows);
   std::shared_ptr<const SpatialGrid> GridAt(std::uint64_t tick);
 
@@ -174,7 +174,7 @@ class WorldShard {
     DroppedRequest request;
   };
   std::deque<Dropped> dropped_;          // Dropped requests that are not reported yet.
-  std::size_t dropped_events_left_ = 0;  // How many of them may still be reported in this tick.
+  std::size_t dropped_events_left_ = 0;  // How many of dropped_ may still be reported in this tick.
   std::uint64_t step_ = 0;               // Number of steps since this object was created.
   std::uint64_t tick_ = 0;               // Tick of the current or last Advance.
   // Number of steps that are left in the current Advance.
