@@ -101,10 +101,10 @@ namespace Stridewire
         Quantised = 1,
         /// <summary>The server sends movements, about 150 bytes per step, and the client evaluates
         /// the poses. They equal those of STRIDEWIRE_FULL bit for bit. The client fetches the
-        /// world's library first, unless it is in `library_folder`, and holds back this and later
-        /// commands to the world meanwhile. The reply is UNSUPPORTED or MALFORMED if the client
-        /// cannot use the library. An avatar costs about 1 us per tick and up to 16 KiB. The client
-        /// ignores avatars beyond `max_pose_bytes` / 16 KiB.</summary>
+        /// world's library first, unless it is in `library_folder`. Until then, it delays this and
+        /// all later commands to the world. The reply is UNSUPPORTED or MALFORMED if the client
+        /// cannot use the library. An avatar costs the client about 1 us per tick and up to 16 KiB.
+        /// The client ignores avatars beyond `max_pose_bytes` / 16 KiB.</summary>
         Movement = 2,
     }
 
@@ -149,8 +149,8 @@ namespace Stridewire
         /// <summary>Uses world. The skeleton is available. Repeated after SESSION_LOST.</summary>
         WorldJoined = 5,
         /// <summary>Uses command, status, accepted, text. The status is OK only if the server has
-        /// executed all items. If it refused some of them, it is the status of the first one, and
-        /// `accepted` is the number of the others, which were executed.</summary>
+        /// executed all items. Otherwise it is the status of the first refused item. `accepted` is
+        /// the number of executed items.</summary>
         Reply = 6,
         /// <summary>Uses command, item_index, avatar, request_id, status, text. Reports an item
         /// that the server refused, or the id that it chose for a spawned avatar. Precedes the

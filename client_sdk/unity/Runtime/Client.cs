@@ -230,7 +230,7 @@ namespace Stridewire
         }
 
         /// <summary>Gets the server time at which to sample poses. Returns false before the first
-        /// pose.</summary>
+        /// pose or pong.</summary>
         public bool TryGetRenderTime(out double timeS)
         {
             double result;

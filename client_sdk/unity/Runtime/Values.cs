@@ -139,8 +139,8 @@ namespace Stridewire
         public PoseDetail Detail;
     }
 
-    /// <summary>Describes how the render time adapts to the connection. Times are 0 before the
-    /// first pose.</summary>
+    /// <summary>Describes how the render time adapts to the connection. Times that are not known
+    /// yet are 0.</summary>
     public struct Playout
     {
         /// <summary>Delay of the render time behind the server time in seconds.</summary>

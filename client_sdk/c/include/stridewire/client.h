@@ -26,11 +26,11 @@
 /// of the caller, whose sizes are stated at each function. Handles are opaque. A NULL handle yields
 /// STRIDEWIRE_INVALID_ARGUMENT.
 ///
-/// Connection. The client connects, and reconnects, in the background. The first retry follows a
-/// failure after 0.1 s. The delay doubles with each failure, up to 5 s, and is shortened by a
-/// random amount of up to half. The client retries until it is disconnected or the server refuses
-/// it permanently. Commands are queued while there is no connection. If there are several servers,
-/// see stridewire_client_connect_any. After a reconnect:
+/// Connection. The client connects, and reconnects, in the background. It waits 0.1 s before the
+/// first retry. The delay doubles with each failure, up to 5 s, and is shortened by a random amount
+/// of up to half. The client retries until it is disconnected or the server refuses it permanently.
+/// Commands are queued while there is no connection. If there are several servers, see
+/// stridewire_client_connect_any. After a reconnect:
 ///   - If the server still has the session, it resumes (STRIDEWIRE_EVENT_CONNECTED with `resumed`).
 ///     The client sends unanswered commands again, and the server executes each of them once.
 ///   - Otherwise the session is lost (STRIDEWIRE_EVENT_SESSION_LOST), for example because the
@@ -190,8 +190,8 @@ stridewire_status stridewire_client_spawn(stridewire_client* client, stridewire_
                                           uint64_t* command);
 
 /// Moves `count` existing avatars, 1 to STRIDEWIRE_MAX_ITEMS, at once. They drop their movements
-/// and requests, and stand. Their next pose follows a discontinuity. Fails with INVALID_ARGUMENT if
-/// the id of an avatar is 0.
+/// and requests, and stand. The next pose of each has the flag `discontinuity`. Fails with
+/// INVALID_ARGUMENT if the id of an avatar is 0.
 stridewire_status stridewire_client_teleport(stridewire_client* client, stridewire_world world,
                                              const stridewire_spawn* places, size_t count,
                                              uint64_t* command);
@@ -208,7 +208,7 @@ stridewire_status stridewire_client_remove(stridewire_client* client, stridewire
 /// are dropped before they are completed also end with REJECTED; see `outcome` of stridewire_event.
 ///
 /// If the library cannot walk at a requested speed, REPLY has the status OK and a `text` that
-/// states the possible speeds, and ACCEPTED has `clamped` and the nearest of them.
+/// states the possible speeds. ACCEPTED then has `clamped` and the nearest possible speed.
 stridewire_status stridewire_client_request(stridewire_client* client, stridewire_world world,
                                             const stridewire_movement* movements, size_t count,
                                             uint64_t* command);
@@ -272,8 +272,8 @@ typedef enum stridewire_event_type {
   /// Uses world. The skeleton is available. Repeated after SESSION_LOST.
   STRIDEWIRE_EVENT_WORLD_JOINED = 5,
   /// Uses command, status, accepted, text. The status is OK only if the server has executed all
-  /// items. If it refused some of them, it is the status of the first one, and `accepted` is the
-  /// number of the others, which were executed.
+  /// items. Otherwise it is the status of the first refused item. `accepted` is the number of
+  /// executed items.
   STRIDEWIRE_EVENT_REPLY = 6,
   /// Uses command, item_index, avatar, request_id, status, text. Reports an item that the server
   /// refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
@@ -500,12 +500,12 @@ stridewire_status stridewire_client_server_time(stridewire_client* client, doubl
 
 /// Gets the time at which to sample poses: the server time minus a delay. The client chooses the
 /// smallest delay with which poses arrive in time, and changes it smoothly: render time runs at
-/// most 5 % faster or slower than the server. It jumps only in a new session, after the server's
-/// clock has changed by more than 0.25 s, and if for a second all poses were over 0.25 s too late,
-/// or the delay was over 0.5 s longer than necessary. Sampled poses then belong to another segment.
+/// most 5 % faster or slower than the server. It jumps only in a new session, if the server's clock
+/// changes by more than 0.25 s, if all poses of a second were over 0.25 s too late, and if the
+/// delay was over 0.5 s longer than necessary for a second. A jump starts a new segment of poses.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
 
-/// Describes how the render time adapts to the connection. Times are 0 before the first pose.
+/// Describes how the render time adapts to the connection. Times that are not known yet are 0.
 typedef struct stridewire_playout {
   double delay_s;            ///< Delay of the render time behind the server time.
   double target_delay_s;     ///< The delay that `delay_s` approaches.
@@ -602,7 +602,7 @@ typedef struct stridewire_statistics {
   uint64_t connects;          ///< Completed handshakes.
   uint64_t resumes;           ///< Completed handshakes that resumed a session.
   uint64_t connect_failures;
-  uint64_t buffered_bytes;  ///< Memory used by poses, events and commands now.
+  uint64_t buffered_bytes;  ///< Memory used by poses, events, commands, terrains and buffers now.
   double rtt_s;             ///< Smallest round-trip time of the last 16 pings; 0 before the first.
 } stridewire_statistics;
 

@@ -149,9 +149,9 @@ typedef enum stridewire_pose_mode {
   STRIDEWIRE_QUANTISED = 1,
   /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
   /// equal those of STRIDEWIRE_FULL bit for bit. The client fetches the world's library first,
-  /// unless it is in `library_folder`, and holds back this and later commands to the world
-  /// meanwhile. The reply is UNSUPPORTED or MALFORMED if the client cannot use the library. An
-  /// avatar costs about 1 us per tick and up to 16 KiB. The client ignores avatars beyond
+  /// unless it is in `library_folder`. Until then, it delays this and all later commands to the
+  /// world. The reply is UNSUPPORTED or MALFORMED if the client cannot use the library. An avatar
+  /// costs the client about 1 us per tick and up to 16 KiB. The client ignores avatars beyond
   /// `max_pose_bytes` / 16 KiB.
   STRIDEWIRE_MOVEMENT = 2,
   STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff

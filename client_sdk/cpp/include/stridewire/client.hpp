@@ -122,13 +122,14 @@ inline stridewire_movement Stand(std::uint32_t avatar, std::uint64_t request_id,
   return m;
 }
 
-/// Creates a change that starts a layer, or sets its weight and speed. `name` must outlive the call
-/// to SetLayers.
+/// Creates an argument of SetLayers that starts a layer, or changes its weight and speed. `name`
+/// must outlive the call to SetLayers.
 inline stridewire_layer StartLayer(std::uint32_t avatar, const char* name, double weight = 1.0,
                                    double blend_s = 0.3, double speed = 1.0) {
   return {avatar, name, 0, weight, blend_s, speed};
 }
-/// Creates a change that fades a layer out and ends it. `name` must outlive the call to SetLayers.
+/// Creates an argument of SetLayers that fades a layer out and ends it. `name` must outlive the
+/// call to SetLayers.
 inline stridewire_layer FadeOutLayer(std::uint32_t avatar, const char* name, double blend_s = 0.3) {
   return {avatar, name, 1, 1.0, blend_s, 1.0};
 }
