@@ -1,4 +1,4 @@
-// Drawing options of the scene. The user chooses them, or else the quality level does.
+// Drawing options of the scene. The quality level determines those that the user has not chosen.
 
 import type {UrlOptions} from './url_options.js';
 import {Quality} from './quality.js';

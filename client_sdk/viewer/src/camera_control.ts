@@ -61,7 +61,7 @@ export class CameraControl {
       if (this.framesAll || !view.wasFramed) {
         view.viewCamera.moveTo(extent.x, 0.8, extent.z, !view.wasFramed);
         view.wasFramed = true;
-        // A view that is taller than wide shows as much sideways as a square view (see ViewCamera).
+        // A view that is taller than wide shows the same width as a square view (ViewCamera).
         const {width, height} = view.freeArea;
         const aspect = Math.min(1.7, Math.max(1, width / Math.max(1, height)));
         const distanceM = Math.min(

@@ -92,7 +92,7 @@ export class FootprintTool {
   onEvent(pane: WorldPane, event: WorldEvent): void {
     if (event.type === 'finished') this.requests.delete(event.requestId);
     if (event.type !== 'rejected' || !this.requests.delete(event.requestId)) return;
-    // The server reports no nearest footprint, for example if foot planting is off.
+    // In some cases, for example without foot planting, the server reports no nearest footprint.
     if (event.positionM.every((x) => x === 0)) return;
     this.nearestReachable = {
       pane, atM: event.positionM, headingRad: event.nearestHeadingRad,

@@ -46,7 +46,7 @@ for (const [name, skeleton] of skeletons) {
         (k) => body.positions[v * 3 + k]! - rest[j * 3 + k]!));
       assert.ok(away < 0.55 * body.heightM, `vertex ${v} is ${away} m from ${skeleton.names[j]}`);
     }
-    // The surfaces are closed and face outwards, so that the volume is positive, and that of a
+    // If the surfaces are closed and face outwards, the volume is positive. It must be that of a
     // person.
     let volume = 0;
     const p = body.positions;

@@ -18,7 +18,7 @@ const mapCells = 48;
 /** Pause at the end of the movement, before it repeats. */
 const loopPauseS = 0.45;
 
-/** Requests a step with parameters `p`, from a group of the library with this hash. */
+/** A request for a step with parameters `p`, from a group of the library with this hash. */
 interface StepRequest {
   readonly hash: string;
   readonly group: number;
@@ -26,7 +26,8 @@ interface StepRequest {
   readonly corrected: boolean;
 }
 /**
- * Requests an error map over parameters `x` and `y` (indices); the others keep their values in `p`.
+ * A request for an error map over the parameters with indices `x` and `y`. The others have the
+ * values in `p`.
  */
 interface ErrorMapRequest extends StepRequest {
   readonly x: number;

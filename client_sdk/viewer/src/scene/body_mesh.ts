@@ -332,7 +332,7 @@ function buildLeg(builder: MeshBuilder, parts: BodyParts, index: number, segment
   ], h, Region.trousers, segments);
 
   // The shoe is a tube from heel to toe. Its sole is perpendicular to the shin, as in standing,
-  // because the legs may be spread in the rest pose. It is below the lower of ball and toes.
+  // because the legs may be spread in the rest pose. The sole is below the lower of ball and toes.
   const down = normalised(subtract(leg.ankle.at, leg.knee.at), [0, -1, 0]);
   const dot = (a: Vec, b: Vec): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const ankle = leg.ankle.at;

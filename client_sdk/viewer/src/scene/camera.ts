@@ -98,7 +98,7 @@ export class ViewCamera {
     const y = this.target.y + Math.sin(orbit.elevationRad) * distance;
     this.camera.position.set(x, Math.max(0.15 + (terrain?.heightAt(x, z) ?? 0), y), z);
     this.camera.aspect = aspect;
-    // A view that is taller than wide shows as much sideways as a square one.
+    // A view that is taller than wide shows the same width of the scene as a square view.
     this.camera.fov = aspect >= 1 ? 42 :
       2 * THREE.MathUtils.radToDeg(
         Math.atan(Math.tan(THREE.MathUtils.degToRad(21)) / Math.max(aspect, 0.55)));

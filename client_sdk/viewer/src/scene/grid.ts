@@ -157,7 +157,7 @@ export class Grid {
 function gridLineGeometry(half: number, every: number): THREE.BufferGeometry {
   const positions: number[] = [];
   const kinds: number[] = [];
-  const piece = 8;  // Lines are split, because colours are computed per vertex.
+  const piece = 8;  // Length of the pieces of a line, in metres. Each vertex has its own colour.
   for (let i = -half; i <= half; i += every) {
     if (every === 1 && i % 5 === 0) continue;
     for (let from = -half; from < half; from += piece) {

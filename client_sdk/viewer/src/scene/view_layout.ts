@@ -2,8 +2,8 @@ import type {PageRect} from './camera.js';
 
 /**
  * Divides the page among views: side by side, or above each other if the area that panels leave
- * free (`free`, in CSS pixels) is taller than wide. Each view gets an equal part of it. Viewports
- * also extend beneath the panels, so that together they cover the page.
+ * free (`free`, in CSS pixels) is taller than wide. Each view gets an equal part of this area.
+ * Viewports also extend beneath the panels, so that together they cover the page.
  */
 export function layOutViews(
   views: readonly {freeArea: PageRect; viewport: PageRect}[],

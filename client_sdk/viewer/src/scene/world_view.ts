@@ -100,7 +100,7 @@ export class WorldView {
   private readonly lastFootHeadings = new Map<number, number>();
   private readonly unsubscribe: (() => void)[];
   private readonly planned = makePlannedFootprints(maxPlannedFootprints);
-  /** Describes what the decals show. They are uploaded only if it changes. */
+  /** Describes the planned footprints. Their decals are uploaded only if this text changes. */
   private plannedVersion = '';
   private readonly goals = makeGoals(maxGoalDecals);
   private goalsVersion = '';

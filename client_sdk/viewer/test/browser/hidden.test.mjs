@@ -1,4 +1,4 @@
-// A page that is hidden behind another tab, and one that is frozen, and then shown again.
+// Tests a page that is hidden behind another tab or frozen, and then shown again.
 // Environment, besides that of viewer.test.mjs:
 // STRIDEWIRE_HIDDEN_S  how long the page is hidden; 5 by default, 600 for a long test
 // STRIDEWIRE_FROZEN_S  how long it is frozen; 5 by default

@@ -1,4 +1,4 @@
-// A page whose server is killed and restarted, and whose connection is cut. Environment, besides
+// Tests a page whose server is restarted and whose connection is cut. Environment, besides
 // that of viewer.test.mjs:
 // STRIDEWIRE_RESTARTS  number of restarts; 3 by default, 50 for a long test
 
