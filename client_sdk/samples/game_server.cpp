@@ -75,7 +75,7 @@ class GameServer {
         }
         break;
       case STRIDEWIRE_EVENT_ITEM:
-        // The library has no jumps, so the program stops requesting them.
+        // NO_MOVEMENT means that the library has no jumps, so the program stops requesting them.
         if (event.status == STRIDEWIRE_NO_MOVEMENT) can_jump_ = false;
         refused_ += event.status != STRIDEWIRE_OK;
         break;

@@ -35,7 +35,7 @@ HWY_INLINE Rotations Load(Tag d, const float* from, std::size_t count) {
   return q;
 }
 
-// The order of the sums is that of Dot in base/math.h.
+// Adds in the same order as Dot in base/math.h, so that both round in the same way.
 HWY_INLINE Vec Dot(const Rotations& a, const Rotations& b) {
   return hn::Add(hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z)),
                  hn::Mul(a.w, b.w));

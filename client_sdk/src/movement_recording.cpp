@@ -16,7 +16,7 @@ void MovementRecording::Add(protocol::AvatarId avatar, const PoseStamp& stamp,
     Clear();
     library_ = library;
   }
-  // The time differs if the server has skipped ticks.
+  // If the server has skipped ticks, the time differs from the expected one by more than this.
   constexpr double kMaxDifferenceS = 1e-6;
   const std::uint64_t ticks = stamp.tick - cursor.begin_tick;
   if (cursor.recording == number_ && cursor.movement == movement->number &&

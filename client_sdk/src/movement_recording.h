@@ -33,7 +33,7 @@ class MovementRecording {
   static constexpr std::uint64_t kMaxTicks = 120;
 
   /// Records the pose of an avatar that has a movement and no layers, at `time_s` in the movement.
-  /// Stores the movement unless the pose continues that of `cursor`. `tick_s` is the length of a
+  /// Stores the movement unless the pose continues the one of `cursor`. `tick_s` is the length of a
   /// tick. Ticks must not decrease, except for small differences between shards. While a movement
   /// continues, fewer than kMaxTicks successive ticks may be omitted.
   void Add(protocol::AvatarId avatar, const PoseStamp& stamp,
@@ -46,11 +46,11 @@ class MovementRecording {
   std::size_t Evaluate(std::uint64_t tick, std::span<const protocol::AvatarId> avatars,
                        CrowdPose& out, std::size_t at);
 
-  /// Removes movements that ticks from `tick` on do not need.
+  /// Removes movements that are not needed for `tick` or later ticks.
   void DropBefore(std::uint64_t tick);
   void Clear();
 
-  /// Changes when the recorded movements are removed, which invalidates all cursors.
+  /// Returns a number that changes when all movements are removed, which invalidates all cursors.
   [[nodiscard]] std::uint64_t number() const { return number_; }
   /// Returns the memory of the recorded movements in bytes.
   [[nodiscard]] std::size_t bytes() const { return bytes_; }

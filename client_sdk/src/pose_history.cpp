@@ -124,10 +124,10 @@ ConstPoseSpan PoseHistory::pose(std::size_t i) const {
 // Returns the first pose after a time. Poses are usually sampled shortly before the newest one and
 // arrive at equal intervals, so a search that starts there reads less memory than a binary search.
 std::size_t PoseHistory::FirstAfterTime(double time_s) const {
-  // Written this way so that NaN yields the newest pose.
+  // This form of the comparison treats NaN like a time after the newest pose.
   if (size_ == 0 || !(time_s < stamp(size_ - 1).time_s)) return size_;
-  std::size_t low = 0;           // All poses before it are at or before the time.
-  std::size_t high = size_ - 1;  // This pose is after the time.
+  std::size_t low = 0;           // All poses before this index are at or before the time.
+  std::size_t high = size_ - 1;  // The pose with this index is after the time.
   if (size_ >= 2) {
     const double newest_s = stamp(size_ - 1).time_s;
     const double interval_s = newest_s - stamp(size_ - 2).time_s;
@@ -173,7 +173,7 @@ void PoseHistory::PrefetchPush() const {
   const std::size_t slot = Slot(size_ == entries_.size() ? 0 : size_);
   PrefetchBytes(&entries_[Slot(size_ - 1)], sizeof(Entry));
   PrefetchBytes(&entries_[slot], sizeof(Entry));
-  if (evaluator_ != nullptr) return;  // The next pose is probably not stored.
+  if (evaluator_ != nullptr) return;  // The next pose probably has a movement instead of rotations.
   PrefetchBytes(&rotations_[slot * joint_count_], joint_count_ * sizeof(Quat));
 }
 

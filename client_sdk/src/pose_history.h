@@ -66,7 +66,7 @@ class PoseHistory {
   /// newest pose.
   bool Push(const PoseStamp& stamp, const Vec3& root_position_m, std::span<const Quat> rotations);
 
-  /// Same for a pose that is evaluated when it is read. `time_s` is its time in the movement.
+  /// Adds a pose that is evaluated when it is read. `time_s` is its time in the movement.
   /// `evaluator` must exist until EvaluateAll has been called or the history is destroyed.
   bool Push(const PoseStamp& stamp, const std::shared_ptr<const PlayedMovement>& movement,
             double time_s, MovementEvaluator& evaluator);
@@ -136,8 +136,9 @@ class PoseHistory {
 
   /// Computes the pose at `time_s`: evaluates the movement if one determines the pose, otherwise
   /// interpolates between stored poses (InterpolatePose). In the interval before a discontinuity,
-  /// returns the pose at its start, but extrapolates it if the interval is a gap. Also extrapolates
-  /// after the newest pose. Returns nullopt for times before the oldest pose.
+  /// returns the pose at its start, but extrapolates it if the interval is a gap, more than 1.5
+  /// times as long as the one before. Also extrapolates after the newest pose. Returns nullopt for
+  /// times before the oldest pose.
   [[nodiscard]] std::optional<Sampled> Sample(double time_s, Vec3& root_position_m,
                                               std::span<Quat> rotations) const;
 
@@ -218,7 +219,7 @@ class PoseHistory {
     enum class State : std::uint8_t {
       kNone,
       kPending,  ///< The pose is the one that was displayed at `start_s`.
-      kActive,   ///< The pose is the difference to the curve at `start_s`.
+      kActive,   ///< The pose is its difference from the curve at `start_s`.
     };
     State state = State::kNone;
     double start_s = 0.0;

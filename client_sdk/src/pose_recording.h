@@ -37,10 +37,11 @@ class PoseRecording {
 
   [[nodiscard]] bool enabled() const { return length_s_ > 0.0 && max_bytes_ > 0; }
 
-  /// Adds a copy of a batch. `codecs` decodes its poses if they are compact. Poses of different
-  /// epochs are not interpolated. If a tick of a shard arrives in two modes, only the first one is
-  /// stored. Regions are an exception, because their batches in different modes contain different
-  /// avatars. `moving` contains avatars of the tick whose movements were added to `movements()`.
+  /// Adds a copy of a batch. `codecs` decodes its poses if they are compact. SampleAll does not
+  /// interpolate between poses of different epochs. If a tick of a shard arrives in two modes, only
+  /// the first one is stored. Regions are an exception: their batches in different modes contain
+  /// different avatars. `moving` contains avatars of the tick whose movements were added to
+  /// `movements()`.
   void Add(const protocol::PoseBatch& batch, std::uint64_t epoch,
            const std::shared_ptr<const protocol::CompactCodecs>& codecs,
            std::span<const protocol::AvatarId> moving = {});

@@ -20,7 +20,8 @@ class Session : public SessionCommands {
  public:
   /// Maximum time for sending Goodbye, in seconds.
   static constexpr double kGoodbyeS = 1.0;
-  /// If a connection was ready for this time, the back-off starts again with its shortest delay.
+  /// After a connection that was ready for this time, in seconds, the first delay before
+  /// reconnecting is the shortest one.
   static constexpr double kStableS = 2.0;
 
   using SessionCommands::SessionCommands;

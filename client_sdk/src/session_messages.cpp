@@ -377,8 +377,8 @@ void Session::Handle(const protocol::Movements& message, double now_s) {
   World* world = FindByServerId(message.world, handle);
   if (world == nullptr || world->replicas == nullptr) return;
   const std::uint64_t every_n_ticks = EveryNTicks(*world, protocol::PoseMode::kMovement);
-  // The server may delay movements of ticks that are not evaluated, so that they say nothing about
-  // the delay of the network.
+  // The server may delay movements of ticks that the client does not evaluate. The delay of the
+  // network can therefore not be derived from them.
   if (message.tick % every_n_ticks == 0) FollowPoses(message.server_time_s, now_s);
   if (Status status = world->view->Apply(message, *world->replicas, every_n_ticks, counts_);
       !status) {

@@ -141,7 +141,7 @@ const WorldView::Track* WorldView::FindTrack(protocol::AvatarId avatar) const {
 }
 
 std::size_t WorldView::FindTrackAfter(std::size_t index, protocol::AvatarId avatar) const {
-  // Passes a few tracks that belong to other shards.
+  // The search gives up after this many tracks. It may have to skip tracks of other shards.
   constexpr std::size_t kMaxSteps = 8;
   const std::size_t end = std::min(index + kMaxSteps, tracks_.size());
   while (index < end && tracks_[index].avatar < avatar) ++index;
@@ -230,7 +230,7 @@ void WorldView::PushEvaluated(Track& track, std::uint16_t shard, const PoseStamp
                               const AvatarReplica& replica) {
   const bool is_movement = HasMovementOnly(replica);
   if (track.continued.movement != nullptr) {
-    // The movement has ended before this tick.
+    // The movement that continued has ended before the tick of this pose.
     const ShardTicks& ticks = *track.continued.ticks;
     const bool has_tick = &ticks == ticks_ && ticks.at(ticks.count - 1).tick == stamp.tick;
     Flush(track, ticks.count - (has_tick ? 1 : 0));  // Needs the previous movement.

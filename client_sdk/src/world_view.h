@@ -48,8 +48,7 @@ class WorldView : public PoseSink {
   static constexpr double kKeepGoneS = 2.0;
   /// If an avatar has left the region, the view ignores its older poses for this many ticks.
   static constexpr std::uint64_t kKeepLeftTicks = 600;
-  /// Maximum number of shards, counted separately for each mode. A batch of any further shard is an
-  /// error.
+  /// Maximum number of pairs of a shard and a mode. A batch of any further pair is an error.
   static constexpr std::size_t kMaxShards = 1024;
 
   struct Counts {
@@ -133,8 +132,9 @@ class WorldView : public PoseSink {
   /// Changes whenever the result of Avatars changes.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
 
-  /// The poses of the last seconds, as received batches. If they were evaluated, the recording
-  /// contains the movements, and the poses with layers in compact form. Clear also clears them.
+  /// Returns the recording of the last seconds. It contains the received batches. If this client
+  /// evaluates the poses, it contains the movements instead, and the poses of avatars with layers
+  /// in compact form. Clear also clears the recording.
   [[nodiscard]] PoseRecording& recording() { return recording_; }
 
   /// Samples all avatars at a server time, for display, and counts the poses.
@@ -185,7 +185,7 @@ class WorldView : public PoseSink {
     const ShardTicks* ticks = nullptr;
     MovementPoint sampled;  ///< Tick from which SampleAll computes the time of the movement.
     MovementPoint stored;   ///< Newest tick in the history.
-    // Copies of data of the movement, which is not in the processor's cache.
+    // Copies of data of the movement: the original is usually not in the processor's cache.
     EvaluationBatcher::Similarity similarity;
     std::uint32_t number = 0;  ///< PlayedMovement::number
     bool standing = false;
@@ -232,8 +232,8 @@ class WorldView : public PoseSink {
   /// Finds or creates the track of an avatar. Returns null if there is no memory for it. Calls with
   /// ascending ids are fast, because each search begins after the last track that was found.
   Track* FindOrAddTrack(protocol::AvatarId avatar);
-  /// Returns the index of the track, or one after the end if it is not among the tracks shortly
-  /// after `index`.
+  /// Returns the index of the avatar's track, or tracks_.size() if it is not among the next few
+  /// tracks from `index` on.
   [[nodiscard]] std::size_t FindTrackAfter(std::size_t index, protocol::AvatarId avatar) const;
   /// Calls `push(stamp)` to add a pose to the history.
   template <typename PushPose>
@@ -248,7 +248,8 @@ class WorldView : public PoseSink {
   /// Returns true if the movement that continues includes a pose.
   [[nodiscard]] bool IsContinued(const Track& track, const PoseStamp& stamp,
                                  const AvatarReplica& replica) const;
-  /// Begins to continue the newest movement, if nothing but the history determines the motion.
+  /// Begins to continue the movement of the newest pose, unless the display has extrapolated beyond
+  /// this pose, or a correction still fades.
   void BeginContinuing(Track& track);
   /// Moves a point of a movement to a later tick. Sums the time tick by tick, as replicas do.
   void MoveTo(std::uint64_t tick, const ShardTicks& ticks, MovementPoint& point) const;
@@ -298,7 +299,7 @@ class WorldView : public PoseSink {
   std::vector<Track> tracks_;  // In ascending order of avatar ids.
   // Index after the last track that was found, where the next search starts.
   std::size_t next_track_ = 0;
-  std::size_t prefetched_track_ = 0;  // Same for Prefetch.
+  std::size_t prefetched_track_ = 0;  // Same as next_track_, for Prefetch.
   std::size_t gone_count_ = 0;        // Number of tracks that are gone.
   std::map<Lane, Shard> shards_;
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.

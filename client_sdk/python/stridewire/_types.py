@@ -13,7 +13,7 @@ Vec3 = Sequence[float]
 
 
 def point(position_m: Vec3) -> tuple[float, ...]:
-    """Returns the three numbers of a position, which ctypes would fill up with zeros."""
+    """Returns the three numbers of a position. ctypes would replace missing numbers by zeros."""
     numbers = tuple(position_m)
     if len(numbers) != 3:
         raise ValueError(f"expected a position of 3 numbers (x, y, z), got {len(numbers)}")
@@ -174,7 +174,7 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class Playout:
-    """How the display follows the connection. Times are 0 before the first pose."""
+    """How the display follows the connection. Times that are not known yet are 0."""
 
     delay_s: float  #: Delay of the render time behind the server time.
     target_delay_s: float  #: The delay that `delay_s` approaches.

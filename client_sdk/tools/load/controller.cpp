@@ -294,7 +294,7 @@ void Controller::OnRequestReply(const protocol::Reply& reply, const Pending& pen
     if (item.code == protocol::StatusCode::kOk) continue;
     ++counts_.requests_rejected;
     ++counts_.rejected_by_code[item.code];
-    // The library has no jumps, so the controller stops requesting them.
+    // These codes mean that the library has no jumps, so the controller stops requesting them.
     if (item.code == protocol::StatusCode::kNoMovement ||
         item.code == protocol::StatusCode::kUnsupported) {
       can_jump_ = false;

@@ -133,8 +133,7 @@ class Recorder {
     recording_.clip.joint_count = recording_.skeleton.joint_count();
     hz_ = skeleton.tick_hz;
     const double frames = std::max(1.0, std::round(options_.seconds * hz_));
-    // There are too many frames. The limit is necessary because the server determines the tick
-    // rate.
+    // The limit is necessary because the number of frames depends on the server's tick rate.
     if (frames > kMaxFrames) {
       return Fail(ErrorCode::kLimitExceeded, "too many frames", "--seconds",
                   static_cast<std::int64_t>(frames));

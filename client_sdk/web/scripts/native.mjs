@@ -1,4 +1,4 @@
-// Writes what TypeScript needs to know about the WebAssembly module: its functions, as
+// Writes the TypeScript declarations for the WebAssembly module: its functions, as
 // wasm/client_module.cpp declares them, and the status codes and types of events of the C API.
 import {readFileSync} from 'node:fs';
 import {fileURLToPath} from 'node:url';

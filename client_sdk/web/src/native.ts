@@ -22,7 +22,7 @@ class Native {
   private memory = new Uint8Array(0);
 
   constructor(module: WebAssembly.Module) {
-    // The module prints only before it stops because of a broken invariant.
+    // The module writes text only before it stops, to explain which invariant is broken.
     const instance = new WebAssembly.Instance(module, {wasi_snapshot_preview1: {
       fd_write: (_fd: number, list: number, count: number, writtenAt: number): number => {
         const view = new DataView(this.call.memory.buffer);

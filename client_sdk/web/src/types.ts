@@ -28,8 +28,8 @@ export type PoseMode = 'full' | 'quantised' | 'movement';
 /**
  * Selects the joints that a quantised pose contains.
  * - `all`: all joints.
- * - `reduced`: without joints that move no point of the figure by more than 0.12 m, for example
- *   hands, toes and head.
+ * - `reduced`: omits joints whose omission moves no point of the figure by more than 0.12 m, for
+ *   example hands, toes and head.
  * - `root`: the root joint only.
  *
  * The client sets an omitted joint to its reference rotation, which is a typical rotation of that
@@ -63,7 +63,7 @@ export interface Reply {
   readonly ok: boolean;
   /**
    * Status code, one of `Status`; 0 if ok. 1xx: the caller, 2xx: data, 3xx: network, 4xx: server.
-   * If only some items failed, the code of the first of them; `accepted` counts the others.
+   * If only some items failed: the code of the first failed one. `accepted` counts the others.
    */
   readonly code: number;
   /** Name of the code, for example `no_such_avatar`. */

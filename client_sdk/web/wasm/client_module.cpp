@@ -304,7 +304,8 @@ STRIDEWIRE_EXPORT(create) Client* Create(std::size_t name_bytes, std::size_t tok
   options.ping_interval_s = numbers[6];
   options.render_delay_s = numbers[7];
   options.seed = static_cast<std::uint64_t>(numbers[8]);
-  options.respawn = numbers[10] != 0.0;  // numbers[9] limits the events, which the module ignores.
+  // The module does not use numbers[9], the maximum number of recorded events.
+  options.respawn = numbers[10] != 0.0;
   options.keep_worlds = true;
   options.detailed_events = false;
   options.evaluation = WorldView::Evaluation::kWhenSampled;
