@@ -326,8 +326,8 @@ void Observe(benchmark::State& state, const std::shared_ptr<const Crowd>& crowd,
   const auto write_all = [&] {
     for (Writer& writer : writers) writer.Write();
   };
-  // In the first tick, sessions receive the avatars that enter their regions. A few ticks later,
-  // the TCP windows have opened.
+  // The first ticks are not measured: sessions receive the avatars that enter their regions, and
+  // the TCP windows still have to open.
   for (int tick = 0; tick < 8; ++tick) {
     if (way != Through::kFloor) host.Tick(crowd->delivery);
     for (std::size_t i = 0; i < writers.size(); ++i) writers[i].Begin(all_wanted[i].frames);

@@ -3,7 +3,7 @@
 //   stridewire-bench [--instruction-set=NAME] [--benchmark_...] [LIBRARY.swl ...]
 //
 // The kernels use the widest vectors of the machine (AVX-512, AVX2, SSE4, NEON), or the named
-// instruction set. The floors always use the fastest instruction set.
+// instruction set. The lower bounds ("floor") always use the fastest instruction set.
 //
 // A step is counted as in the paper: weights, blended keytimes and the poses of its whole duration,
 // here 30 of them.

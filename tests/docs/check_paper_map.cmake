@@ -1,9 +1,9 @@
-# cmake -DROOT=<project> -P check_paper_map.cmake: every file, function, type and test that
-# docs/PAPER_MAP.md names in `backquotes` is there.
+# cmake -DROOT=<project> -P check_paper_map.cmake: checks that every file, function, type
+# and test that docs/PAPER_MAP.md names in `backquotes` exists.
 #
 #   a/b.h          a file, from the root, core/include/stridewire or core/src
 #   Suite.Name     a GoogleTest test, with or without an instantiation prefix, or a test of ctest
-#   Name() Name    what one of the files of the same line has
+#   Name() Name    a name in one of the files of the same line
 cmake_minimum_required(VERSION 3.25)
 
 file(GLOB_RECURSE test_files ${ROOT}/tests/*.cpp ${ROOT}/tests/CMakeLists.txt)
@@ -24,7 +24,7 @@ foreach(file IN LISTS test_files)
 endforeach()
 
 set(checked 0)
-# Brackets and semicolons would upset CMake's lists.
+# Brackets and semicolons have a meaning in the lists of CMake.
 file(READ ${ROOT}/docs/PAPER_MAP.md page)
 string(REGEX REPLACE "[][;]" " " page "${page}")
 string(REPLACE "\n" ";" lines "${page}")

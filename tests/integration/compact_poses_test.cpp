@@ -358,9 +358,9 @@ TEST(PoseQuantization, UsesTheIdentityAsReferenceForSmallRotations) {
       EXPECT_LE(std::abs(joint.reference.w), 0.997f) << j;
     }
   }
-  // Spine, neck, head, shoulders, hands and toes.
+  // Spine, neck, head, shoulders, hands and toes have small rotations.
   EXPECT_GE(as_they_are, 10);
-  // But not the thighs, knees and arms.
+  // Thighs, knees and arms have larger ones.
   EXPECT_LT(as_they_are, static_cast<int>(code.joints.size()) - 4);
 }
 

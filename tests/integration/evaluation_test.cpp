@@ -279,8 +279,9 @@ TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
 
 // All machines produce this hash (decision 0002). If a formula for poses changes intentionally, the
 // hash changes, and the protocol needs a new version. Otherwise clients that evaluate movements
-// with the old formulas would display other poses than the server (decision 0021). Replicas receive
-// the decisions of avatars, such as the speed of a step, so another decision changes the hash only.
+// with the old formulas would display other poses than the server (decision 0021). If only the
+// decisions of avatars change, for example the speed of a step, the protocol needs no new version,
+// because replicas receive these decisions.
 TEST(Evaluation, MatchesTheProtocolVersion) {
   DrawnCrowd crowd(LibraryOf({}), 24, 10, {.idle_motion = false});
   std::string bytes;
@@ -292,8 +293,8 @@ TEST(Evaluation, MatchesTheProtocolVersion) {
   EXPECT_EQ(protocol::kProtocolVersion, 1u);
 }
 
-// The same for the variation of steps. Replicas receive its results, so a new hash needs no new
-// version of the protocol.
+// The bytes of varied steps must be the same, too. Replicas receive the results of the variation,
+// so a new hash needs no new version of the protocol.
 TEST(Evaluation, StrideVariationHasTheSameBytesOnEveryMachine) {
   std::string bytes;
   for (std::uint64_t seed = 0; seed < 4; ++seed) {
@@ -310,7 +311,7 @@ TEST(Evaluation, StrideVariationHasTheSameBytesOnEveryMachine) {
   EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0xbbb974d359269af6u);
 }
 
-// The same for standing avatars, whose motion is generated when a library is opened.
+// The same for poses of standing avatars, whose motion is generated when a library is opened.
 TEST(Evaluation, IdleMotionMatchesTheProtocolVersion) {
   std::string bytes;
   for (std::uint64_t seed = 0; seed < 4; ++seed) {

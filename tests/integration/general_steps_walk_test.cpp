@@ -87,9 +87,9 @@ struct Foothold {
   double height_m;
 };
 
-// Ground height of stairs along z. Each tread begins 14 cm behind the ball of a foot that stands on
-// it, but 1 cm ahead of the toes of a foot on the step below, which are 9 cm ahead of its ball. It
-// ends 1 cm ahead of the ball of a foot that steps down from it.
+// Ground height of stairs along z. On the way up, a tread begins 14 cm behind the ball of the foot
+// on it, but at least 10 cm ahead of the ball of the foot below, which is 1 cm ahead of its toes.
+// On the way down, a tread ends 1 cm ahead of the ball of the foot on it.
 double GroundAt(const std::vector<Foothold>& holds, double z_m) {
   double height = holds.front().height_m;
   for (std::size_t i = 1; i < holds.size(); ++i) {

@@ -1177,8 +1177,8 @@ TEST_F(LibraryTool, FailsIfStdoutCannotBeWritten) {
   ExpectSentence(result.err, "cannot write");
 }
 
-// The rest pose of these files does not stand, so that each motion suggests an up axis. One figure
-// lies on a table all the time.
+// In the rest pose of these files, the figure does not stand, so the reader derives the up axis
+// from each motion. One figure lies on a table all the time, which suggests a wrong axis.
 TEST_F(LibraryTool, FilesOfABuildAgreeOnTheirUpAxis) {
   test::BvhText figure;
   figure.folded = true;

@@ -184,8 +184,8 @@ Capture ThroughFile(const Capture& capture) {
   return ParseBvh(text.str(), "walk.bvh").value();
 }
 
-// In a file, the joints of the rest pose of such a figure point in arbitrary directions, so the
-// reader must not rely on it.
+// In a file with turned joint frames, the bones of the rest pose point in arbitrary directions, so
+// the reader must not rely on the rest pose.
 TEST(ReframedFiles, PlayTheSame) {
   const std::vector<std::string> subjects = {kDebianTakes};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);

@@ -1,6 +1,6 @@
-// How many examples the selection keeps of captured steps, and at what cost: the error of every
-// step when it is left out and synthesized from the selected steps, from all steps, and from the
-// same number of random steps.
+// Measures how many captured steps the selection keeps, and compares errors: each step is left out
+// and synthesized from the selected steps, from all steps, and from the same number of random
+// steps.
 
 #include <gtest/gtest.h>
 

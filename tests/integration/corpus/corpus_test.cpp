@@ -144,8 +144,8 @@ bool MovesMatch(const CorpusCase& file, const Outcome& outcome) {
   return glm::length(outcome.mean_move_m - file.mean_move_m) <= file.move_tolerance_m;
 }
 
-// Too many steps, steps in another direction, another size, or steps that are missing without any
-// reason.
+// Returns true if a library has too many steps, steps in another direction or of another size, or
+// lacks steps without a stated reason.
 bool IsSilentlyWrong(const CorpusCase& file, const Outcome& outcome) {
   if (!outcome.has_library) return outcome.sentences.empty();
   const bool too_many = outcome.steps[0] > file.steps[0] + 1 ||

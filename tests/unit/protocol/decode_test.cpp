@@ -152,7 +152,7 @@ TEST(Decode, ChecksNumbers) {
 }
 
 TEST(Decode, RejectsAMisalignedList) {
-  // For one of these two lengths of the data after it, the list of doubles is aligned to 4 bytes
+  // With one of these two numbers of bytes after it, the list of doubles is aligned to 4 bytes
   // only.
   int refused = 0;
   for (const std::size_t behind : {32u, 36u}) {
