@@ -112,7 +112,7 @@ void SessionStream::OnMovements(SharedMovements& movements) {
                                            : EncodeFrame(context_.host.encoder(), selected),
                   wait_s);
   }
-  if (is_due) OnGathered(delivery.tick, delivery.from_shard);
+  if (is_due && wait_s > 0.0) OnGathered(delivery.tick, delivery.from_shard);
   RegionMembers* region = subscriptions_.FindRegion(delivery.world, PoseMode::kMovement);
   // The grid is null until the shard has received the region.
   if (region != nullptr && delivery.grid != nullptr) {

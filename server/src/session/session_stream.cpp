@@ -154,25 +154,29 @@ void SessionStream::OnPoses(SharedPoses& poses) {
 }
 
 void SessionStream::SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames) {
+  const double wait_s = GatherTime();
   CountDroppedBatches(delivery.world,
                       context_.connection->SendPoses({.world = delivery.world,
                                                       .mode = delivery.mode,
                                                       .shard = delivery.from_shard,
                                                       .avatar_count = delivery.avatar_count,
                                                       .frames = std::move(frames)},
-                                                     GatherTime()));
-  OnGathered(delivery.tick, delivery.from_shard);
+                                                     wait_s));
+  if (wait_s > 0.0) OnGathered(delivery.tick, delivery.from_shard);
 }
 
 double SessionStream::GatherTime() const {
-  if (context_.host.shard_count() == 1) return 0.0;
+  if (context_.connection == nullptr || context_.connection->kind() != TransportKind::kWebSocket ||
+      context_.host.shard_count() == 1) {
+    return 0.0;
+  }
   // The limit of half a tick ensures that batches are sent before those of the next tick.
   return std::min(context_.host.config().limits.websocket_gather_s,
                   0.5 / context_.host.config().tick_hz);
 }
 
 void SessionStream::OnGathered(std::uint64_t tick, int shard) {
-  if (context_.connection == nullptr || tick < gathered_tick_) return;
+  if (tick < gathered_tick_) return;
   if (tick > gathered_tick_ || gathered_.empty()) {
     gathered_tick_ = tick;
     gathered_.assign(static_cast<std::size_t>(context_.host.shard_count()), false);

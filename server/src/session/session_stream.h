@@ -116,10 +116,10 @@ class SessionStream {
                      double wait_s);
   /// Sends `frames`, which contain poses of `delivery`.
   void SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames);
-  /// Returns how long batches of a tick may wait for those of other shards.
+  /// Returns how long batches of a tick may wait for those of other shards. 0: they do not wait.
   [[nodiscard]] double GatherTime() const;
-  /// Must be called after a batch of a shard was sent. Sends all batches of the tick when those of
-  /// all shards are there.
+  /// Must be called after a batch that may wait was passed to the connection. Sends all batches of
+  /// the tick when those of all shards are there.
   void OnGathered(std::uint64_t tick, int shard);
   void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
   /// Numbers and sends a message. While the client is not connected, stores it instead. Returns how
