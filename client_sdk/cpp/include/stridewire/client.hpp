@@ -186,7 +186,7 @@ class Client {
     return *this;
   }
 
-  /// Returns the handle, for C functions without a method here. This object keeps the ownership.
+  /// Returns the handle, for C functions without a method here. This object still owns it.
   stridewire_client* get() const { return handle_; }
 
   Result Connect(const std::string& host, std::uint16_t port) {

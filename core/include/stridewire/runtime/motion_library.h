@@ -224,7 +224,7 @@ class MotionLibrary {
   /// `from`. Returns null if the file contains no transitions.
   [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const;
   /// Pose of an avatar that has just been spawned, relative to its base frame. The root is at
-  /// x = z = 0 with heading 0, and y is above the ground.
+  /// x = z = 0 with heading 0, and y is its height above the ground.
   [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
   /// Geometry of the skeleton's legs, for foot planting.
   [[nodiscard]] const LegRig& leg_rig() const { return *leg_rig_; }

@@ -12,7 +12,7 @@ namespace stridewire {
 [[nodiscard]] std::vector<int> CellsAtRate(const std::vector<std::vector<double>>& keytimes_s,
                                            double fps);
 
-// Maximum error of a stored example, in radians: the mean over joints and time.
+// Maximum error of a stored example in radians, averaged over joints and time.
 inline constexpr double kStoredErrorRad = 0.45 / 57.29577951308232;
 
 // Chooses the number of grid cells per keytime interval for a group of valid examples. Starts with

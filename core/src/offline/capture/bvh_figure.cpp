@@ -170,8 +170,8 @@ class FigureBuilder {
   }
 
   // Finds the root of the figure: the highest joint above the legs from which a part of the body
-  // branches off. No joint on the way from the root to the legs moves relative to its parent,
-  // because only the root of a figure can have positions.
+  // branches off. All joints below it on the way to the legs must keep their offsets from their
+  // parents, because only the root of a figure can have positions.
   void FindRoot() {
     for (int j = figure_.legs.root; j >= 0; j = file_.joints[Index(j)].parent) chain_.push_back(j);
     std::ranges::reverse(chain_);

@@ -57,7 +57,7 @@ struct RequestPlan {
   ParameterValues applied;
   bool extrapolated = false;       ///< True if `applied` is outside the original hull.
   std::optional<Footprint> exact;  ///< Footprint requested by a step.
-  /// Maximum error of the footprint that planting distributes over the swing.
+  /// Planting distributes a horizontal error of at most this distance over the swing.
   double most_residual_m = 0.25;
   std::optional<DVec3> root_m;     ///< Steps: horizontal position of the root at the end.
   std::optional<double> turn_rad;  ///< Steps: the requested change of heading.
