@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "base/trig.h"
+#include "runtime/library/contact_keytimes.h"
 #include "runtime/plan/foot_planner.h"
 #include "runtime/skeleton/leg_rig.h"
 
