@@ -2,9 +2,9 @@ import {ByteBuffer} from 'flatbuffers';
 
 /** Values and functions that the generated code uses to read messages. */
 
-/** Contains a table without fields at position 4. */
+/** A buffer that contains a table without fields at position 4. */
 export const absent = new ByteBuffer(Uint8Array.of(4, 0, 4, 0, 4, 0, 0, 0));
-/** Contains a struct of any type at position 0, with members that are 0. */
+/** A buffer of zeros. Every struct that is read at position 0 has members that are 0. */
 export const zeros = new ByteBuffer(new Uint8Array(64));
 
 const decoder = new TextDecoder('utf-8', {ignoreBOM: true});
