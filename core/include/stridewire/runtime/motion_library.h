@@ -217,8 +217,8 @@ class MotionLibrary {
   [[nodiscard]] std::span<const LayerClip> layers() const;
   /// Returns the index of the layer with this name, or -1.
   [[nodiscard]] int FindLayer(std::string_view name) const;
-  /// Transitions between movements as a table [from][to]. Each index is that of a group of the
-  /// file, or the number of these groups for the stand. Empty if the file contains no transitions.
+  /// Transitions between movements as a table [from][to]. Index i is group i of the file; the
+  /// index after the last group is the stand. Empty if the file contains no transitions.
   [[nodiscard]] std::span<const Transition> transitions() const;
   /// Returns an entry of transitions(): how well a movement of group `to` can follow one of group
   /// `from`. Returns null if the file contains no transitions.

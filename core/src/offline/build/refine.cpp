@@ -333,7 +333,7 @@ class GroupRefiner {
     return sites;
   }
 
-  // The bare rule: adds a pseudoexample at the largest error, even if the error then increases.
+  // Adds a pseudoexample at the largest error, even if the largest error then increases.
   std::shared_ptr<const Candidate> AddWorst(const Candidate& current, HullSurvey& survey,
                                             GroupRefinement& report) {
     for (const HullPoint& peak : survey.peaks) {

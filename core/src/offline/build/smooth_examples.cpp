@@ -45,7 +45,7 @@ std::vector<double> SitesOf(const MotionGroup& group, std::span<const int> examp
 
 // Solves the equations of Smoothness. `inverse` is the inverse of [R + ridge I, A; A^T, 0], where R
 // and A contain one row per site: R(p) and A(p) at the site. The first columns of the inverse, one
-// per site, contain r, and below it a.
+// per site, contain r in their upper rows and a in the rows below.
 struct Kriging {
   std::vector<double> sites;  // [site][d]
   std::vector<double> scales;

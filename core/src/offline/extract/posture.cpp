@@ -9,8 +9,8 @@ namespace {
 // length, and the sine of the angle between trunk and ground.
 constexpr double kLowPelvisShare = 0.65;
 constexpr double kFlatTrunkSine = 0.45;
-// When a figure crawls on hands and feet, the pelvis is higher, but the trunk does not rise from
-// it.
+// When a figure crawls on hands and feet, the pelvis is higher, but the upper end of the trunk is
+// at most slightly above it.
 constexpr double kRaisedPelvisShare = 0.85;
 constexpr double kLevelTrunkSine = 0.1;
 

@@ -36,8 +36,8 @@ using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 /// Replaces the time warp and the foot plan of `movement` so that both feet stay locked.
 void StandOn(const FootLocks& locks, Movement& movement);
 
-/// Returns the foot locks at a time of a planned movement at which both feet stand. `pose` is the
-/// blended pose with its difference pose at that time.
+/// Returns the foot locks of a planned movement at `time_s`. Both feet must stand at that time.
+/// `pose` is the blended pose at that time, including its difference pose.
 [[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
                                     double time_s, ConstPoseSpan pose);
 
