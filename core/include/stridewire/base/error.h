@@ -22,14 +22,13 @@ enum class ErrorCode : std::uint8_t {
   kIo,               ///< An operating system call failed.
 };
 
-/// An error with its code, a fixed sentence and its location. Runtime code leaves `where` empty, so
-/// that reporting an error does not allocate. Code that reads files sets `where` to "file:line" or
-/// to the name of a field.
+/// An error with its code, a fixed sentence and its location. Code that reads files or checks input
+/// sets `where`. Other code leaves it empty, so that reporting an error does not allocate.
 struct Error {
   ErrorCode code = ErrorCode::kInvalidArgument;
   const char* text = "";    ///< A sentence without its full stop, in static storage.
   std::int64_t index = -1;  ///< The offending index or value; -1 if there is none.
-  std::string where;        ///< File and line, option or field; may be empty.
+  std::string where;        ///< File and line ("walk.bvh:12"), option or field; may be empty.
 };
 
 template <typename T>

@@ -75,9 +75,12 @@ struct BvhReadOptions {
 ///   of frames differs from `Frames`, the reader keeps the complete frames, at most `Frames` of
 ///   them unless that is 0, and adds a note.
 /// - Numbers may have decimal commas if no number has a decimal point.
-/// - The figure is the first ROOT that has legs. Its root is the lowest joint above both legs and
-///   the rest of the body, and contains the motion of all joints above it. Joints above it that
-///   carry no part of the body, such as cameras, are left out.
+/// - The figure is the first ROOT whose joint names identify two legs or, if there is none, the
+///   first ROOT that has legs. Its root is the lowest joint above both legs and the rest of the
+///   body, and contains the motion of all joints above it. Between the root and the legs, no joint
+///   may change its offset. Parts of the body that branch off too high for that are attached to the
+///   root. Branches that are no part of the body, such as cameras, are left out if they begin above
+///   the root.
 /// - Position channels of the root replace its OFFSET. For other joints, the mean of the position
 ///   channels becomes the offset, and a note states the largest deviation from it. If the mean
 ///   moves a joint of the legs, the trunk or the arms by more than 2 cm, the file is rejected. If
@@ -87,11 +90,12 @@ struct BvhReadOptions {
 /// - The reader detects legs by joint names that end in the side and the part of the leg. If that
 ///   fails, it looks for two chains of equal length that start at the same joint and end below the
 ///   rest of the body. It takes the pair nearest to the root; of several such pairs, the longest. A
-///   joint that never bends the leg divides the thigh or the shin, but is not the knee. A figure
-///   without two legs, or with more than two, is rejected. If there is no toe joint, the ball of
-///   the foot is a fixed point in the frame of the ankle. This point is the End Site of the foot if
-///   the End Site is nearer than 0.2 leg lengths. Otherwise its horizontal distance from the ankle
-///   is 2/3 of that of the End Site, and it is as high as the End Site when the sole is flat.
+///   joint that never bends the leg, such as a twist joint, is part of the thigh or the shin and
+///   does not count as the knee. A figure without two legs, or with more than two, is rejected. If
+///   there is no toe joint, the ball of the foot is a fixed point in the frame of the ankle. This
+///   point is the End Site of the foot if the End Site is nearer than 0.2 leg lengths. Otherwise
+///   its horizontal distance from the ankle is 2/3 of that of the End Site, and it is as high as
+///   the End Site when the sole is flat.
 /// - If the figure stands in the rest pose, this pose determines the up axis. If it does not, or if
 ///   it clearly stands and moves along another axis in the motion, the up axis is the mean
 ///   direction from ankles to hips over the motion. A rest pose that stands is turned to face +Z.
@@ -99,9 +103,11 @@ struct BvhReadOptions {
 /// - The unit is the common unit (m, ft, dm, 1/0.45 inch, inch, cm or mm) for which the legs are
 ///   0.68 to 1.0 m long. If no unit fits, the motion is scaled so that standing hips are at 0.95 m.
 /// - `Capture::first_frame` skips an artificial rest pose at the start. The reader assumes such a
-///   pose if at least four joints jump between frames 0 and 1: by more than 10 degrees and 8 times
-///   as far as in the following frames, or at more than 600 degrees/s from a frame whose root is
-///   not rotated. It skips frames while at least two joints turn that fast, at most 0.1 s.
+///   pose if at least four joints rotate by more than 10 degrees between frames 0 and 1, and by
+///   more than 8 times as much as between frames 1 and 2. It also assumes one if the root is
+///   rotated in frame 1 but not in frame 0, and at least four joints rotate at more than 600
+///   degrees/s between these frames. Besides frame 0, it skips frames while at least two joints
+///   rotate at more than 600 degrees/s, up to 0.1 s in total.
 /// - If `Frame Time` implies feet that are too slow for a person, the reader adds a note; use `fps`
 ///   to override it. A file without `Frame Time` needs `fps`.
 ///

@@ -44,7 +44,8 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 ///
 /// - step: requires either `length_m`, with optional side, height and turn, or `at_m`, the world
 ///   position where the ball of the foot lands. With `at_m`, `heading_rad` of the footprint is
-///   optional. With `exact_only`, the step is skipped unless the foot lands exactly at its place.
+///   optional. With `exact_only`, the step is skipped unless the foot lands exactly at the
+///   requested place.
 /// - step and jump: skipped if the nearest movement of the library misses the request by more than
 ///   0.2 m or 60 degrees. With `"allow_nearest": true`, that movement is played.
 /// - walk_to: requires `position_m` and `heading_rad`.

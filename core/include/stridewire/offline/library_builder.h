@@ -21,10 +21,11 @@ struct SelectionOptions {
   /// enlarged by 10 %. In metres; one radian counts as 0.5 m. 0 keeps every step.
   double max_pose_error_m = 0.0;
   /// For each step, the other steps predict its pose and duration from its parameters. The step is
-  /// an outlier if the error of a prediction exceeds the median error of the group by more than
-  /// this number of deviations (1.4826 times the median absolute deviation). Only steps inside the
-  /// hull of the others are tested, in groups of at least eight, because steps at the border of the
-  /// hull are rare, not wrong. At most one step in ten is removed. 0 disables the test.
+  /// an outlier if its pose error exceeds the median of the group, or if its duration error differs
+  /// from the median, by more than this number of deviations. A deviation is 1.4826 times the
+  /// median absolute deviation, and at least 2 mm or 5 ms. Only steps inside the hull of the others
+  /// are tested, in groups of at least eight, because steps at the border of the hull are rare, not
+  /// wrong. At most one step in ten is removed. 0 disables the test.
   double outlier_deviations = 0.0;
 };
 
@@ -45,8 +46,9 @@ struct SelectedExample {
   bool mirrored = false;
   ExampleFate fate = ExampleFate::kKept;
   int example = -1;  ///< Index in the library's group; -1 if not stored.
-  /// If not stored: mean distance between its joints and those of the step that the library blends
-  /// for its parameters, in metres.
+  /// If not stored: mean distance between its joints and those of the movement that is blended for
+  /// its parameters, in metres. For kRedundant, the movement is blended from the kept examples, for
+  /// kOutlier from the other examples.
   double error_m = 0.0;
   std::string reason;  ///< One sentence.
 };
@@ -71,22 +73,24 @@ struct GroupSelection {
 /// generic-time grid, aligns quaternion hemispheres, selects or averages examples as configured,
 /// and solves for the interpolation weights.
 struct LibraryBuilder {
-  /// Returns a builder configured to store all captured movements. It bends toes upward where they
-  /// are below the ground, and changes nothing else.
+  /// Returns a builder that is configured to store all captured movements. It bends toes upward
+  /// where they are below the ground, and changes nothing else.
   [[nodiscard]] static LibraryBuilder KeepingAll();
-  /// Returns a builder configured to keep a representative selection of captured movements. It
-  /// averages movements within 5 cm of each other. It drops outliers beyond five deviations, and
-  /// movements that the others reproduce within 2.5 cm. Finally, it smooths the kept movements and
-  /// bends toes upward where they are below the ground.
+  /// Returns a builder that is configured to keep a representative selection of captured movements.
+  /// It drops outliers beyond five deviations, averages movements within 5 cm of each other, and
+  /// drops those that the others reproduce within 2.5 cm. Finally, it smooths the kept movements
+  /// and bends toes upward where they are below the ground.
   [[nodiscard]] static LibraryBuilder Selecting();
 
   /// Approximate number of grid cells per second of mean duration. Intervals in which an example
   /// would be stored with an error above 0.45 degrees have more cells.
   double grid_fps = 30.0;
   /// Examples are averaged if their parameters are within this distance of each other, in metres; a
-  /// radian counts as 0.5 m. They are grouped by complete-linkage clustering. 0 disables averaging.
+  /// radian counts as 0.5 m. They are grouped by complete-linkage clustering. With 0, only
+  /// duplicates within 1 mm are averaged.
   double cluster_diameter = 0.0;
-  /// Determines which examples are not stored after averaging. By default, all are stored.
+  /// Determines which examples are dropped: outliers before averaging, redundant examples after it.
+  /// By default, none are dropped.
   SelectionOptions selection;
   /// True: the selected examples are replaced with a smooth function of their parameters that is
   /// robust against outliers. It contains what the examples have in common, without individual

@@ -36,7 +36,8 @@ struct MovementRecord {
   ParameterValues requested;
   ParameterValues applied;  ///< `requested` after clamping to the range of the examples.
   /// Weighted sum of the examples' parameters, with the weights of the blend. The weight correction
-  /// chooses these weights so that `measured` equals `applied`.
+  /// chooses these weights so that `measured` equals `applied`. Without weight correction, equals
+  /// `applied`.
   ParameterValues corrected;
   ParameterValues measured;  ///< Parameters measured on the movement, a(p) in the paper.
   bool extrapolated = false;
@@ -71,8 +72,8 @@ struct SkippedRequest {
 
 /// Starts, changes or stops a layer when a movement begins.
 struct LayerCue {
-  /// Index, in the list of requests, of the movement with which the cue takes effect. The number of
-  /// requests is allowed as well. It has no visible effect, because no movement follows.
+  /// Index in SynthesisInput::requests. The cue takes effect when this request starts. If the index
+  /// equals the number of requests, the cue has no effect, because no movement follows.
   std::size_t before = 0;
   std::string layer;  ///< Name of the layer.
   bool enabled = true;
@@ -107,10 +108,11 @@ struct SynthesisInput {
 /// Plays requests on an avatar without a server and records one pose per tick until the avatar is
 /// idle.
 ///
-/// Errors: kUnsupported or kOutOfRange if the library rejects a request or no transition path leads
-/// to it. kLimitExceeded if the result exceeds kMaxSynthesisFrames. For layers, the errors of
-/// LayerStack::Set. Error::where contains the index of a movement in the choreography, which counts
-/// layers.
+/// Errors: kOutOfRange if `fps` is out of range. kLimitExceeded if the result exceeds
+/// kMaxSynthesisFrames. For requests, the errors of Avatar::Enqueue, and kUnsupported if no
+/// transition path leads to a request. For layers, the errors of Avatar::SetLayer. For requests and
+/// layers, Error::where contains the path in a choreography file, for example "movements[3].step".
+/// The list `movements` of such a file contains both.
 [[nodiscard]] Expected<Synthesis> Synthesize(const SynthesisInput& input);
 
 }  // namespace stridewire

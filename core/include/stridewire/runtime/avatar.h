@@ -47,7 +47,7 @@ struct DroppedRequest {
   RequestOutcome outcome = RequestOutcome::kNone;
 };
 
-/// Measures of a step or jump, with the meaning that StepRequest and JumpRequest give them.
+/// Length, side, height and turn of a step or jump, as defined in StepRequest and JumpRequest.
 struct StepMeasures {
   double length_m = 0.0;
   double side_m = 0.0;  ///< 0 for jumps.
@@ -83,8 +83,10 @@ struct AvatarEvent {
   ParameterValues requested;  ///< kStarted: parameters as requested.
   /// kStarted: parameters after clamping to the range of the examples.
   ParameterValues applied;
-  bool extrapolated = false;     ///< kStarted: `applied` is outside the hull of the examples.
-  bool clamped = false;          ///< kStarted: `applied` differs from `requested`.
+  bool extrapolated = false;  ///< kStarted: `applied` is outside the hull of the examples.
+  /// kStarted: `applied` differs from `requested`, and planting does not reach the requested
+  /// footprint exactly.
+  bool clamped = false;
   bool is_cut_short = false;     ///< kFinished: another request interrupted the movement.
   Foot foot = Foot::kLeft;       ///< kFootStrike: the foot that landed.
   Vec3 position_m = Vec3(0.0f);  ///< kFootStrike: ball of that foot, in the world.
@@ -172,8 +174,8 @@ class Avatar {
   /// not planted; kLimitExceeded if the queue contains kMaxQueue requests.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
-  /// Drops the requests that have not started and returns their number. A walk in progress counts
-  /// as one of them. It ends with its current step. The next Advance reports the dropped requests.
+  /// Drops the requests in the queue and returns their number. A walk in progress is one of them.
+  /// It ends with its current step. The next Advance reports the dropped requests.
   int CancelQueue();
 
   /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not
@@ -185,8 +187,8 @@ class Avatar {
   /// and keeps the layers.
   void Teleport(const BaseFrame& start);
 
-  /// Enables or disables foot planting from the next movement on. Fails with kUnsupported if the
-  /// library's skeleton does not support foot planting.
+  /// Enables or disables foot planting from the next movement on. Enabling it fails with
+  /// kUnsupported if the library's skeleton does not support foot planting.
   [[nodiscard]] Status SetFootPlanting(bool enabled);
 
   /// Replaces the terrain. Standing feet keep their positions until their next step.
@@ -203,7 +205,7 @@ class Avatar {
   [[nodiscard]] std::span<const AvatarEvent> events() const;
   /// Base frame of the current movement or stand.
   [[nodiscard]] const BaseFrame& base() const;
-  /// Number of requests that have not started.
+  /// Number of requests that have not started, plus 1 while a walk is in progress.
   [[nodiscard]] int queue_size() const;
   /// True if the avatar stands still and its queue is empty.
   [[nodiscard]] bool idle() const;
@@ -239,7 +241,7 @@ class AvatarCrowd {
 /// Range of the speeds at which the avatars of a library walk straight ahead on level ground.
 struct WalkSpeeds {
   double slowest_m_s = 0.0;
-  double fastest_m_s = 0.0;  ///< 0: unknown, because the library cannot walk far enough.
+  double fastest_m_s = 0.0;  ///< 0: unknown, because a measured walk had too few steps.
 
   /// Speeds outside the range by at most this fraction count as inside, because strides vary.
   static constexpr double kTolerance = 0.05;
@@ -247,7 +249,8 @@ struct WalkSpeeds {
   /// Returns `speed_m_s` if the library can walk at this speed, otherwise the nearest end of the
   /// range. If the range is unknown, returns 0.
   [[nodiscard]] double Nearest(double speed_m_s) const;
-  /// Returns true if the range is known and `speed_m_s` is outside of it by more than kTolerance.
+  /// Returns true if the range is known and `speed_m_s` is outside it by more than the fraction
+  /// kTolerance.
   [[nodiscard]] bool IsOutside(double speed_m_s) const;
 };
 

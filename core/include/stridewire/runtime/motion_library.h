@@ -181,12 +181,14 @@ class MotionLibrary {
   static constexpr int kMaxGridPoints = 4096;  ///< Per group.
 
   /// Opens a library file. Verifies its header, hash and FlatBuffers structure and validates all
-  /// values before it uses any. Errors: kMalformed, kVersionMismatch, kLimitExceeded or kIo, with
-  /// the file in `where`.
+  /// values before it uses any. Errors, with the file in Error::where: kNotFound or kIo if the file
+  /// cannot be read. kMalformed, kVersionMismatch or kLimitExceeded for its contents. kOutOfRange
+  /// or kInvalidArgument for its skeleton (Skeleton::Validate). kUnsupported in WebAssembly, which
+  /// cannot open files.
   [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> Open(
       const std::filesystem::path& path);
 
-  /// Same as Open, for bytes in memory. Copies the bytes.
+  /// Same as Open, for bytes in memory. Copies the bytes. Error::where is empty.
   [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> FromBytes(
       std::span<const std::byte> bytes);
 

@@ -142,7 +142,8 @@ inline constexpr std::size_t kMaxWaypoints = 64;
 
 /// Checks a request. Errors: kOutOfRange if a number is not finite or exceeds its limit;
 /// kInvalidArgument if both `exact_only` and `allow_nearest` are set; kUnsupported if the library
-/// has no movement of the requested kind.
+/// has no movement of the requested kind or, for a walk, lacks steps of one foot. Error::where is
+/// "step", "jump", "walk_to" or "stand".
 [[nodiscard]] Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request);
 
 /// Values of the parameters of a group, in the order of MotionGroup::parameters.
