@@ -43,7 +43,8 @@ class AvatarReplica {
     double length_s = 0.0;
     std::uint64_t number = 0;  ///< Number of the tick. Must increase by 1 from tick to tick.
     bool has_poses = true;     ///< False: poses of this tick are not needed.
-    /// Expected number of ticks between poses. Poses of other ticks are possible, but cost more.
+    /// Expected number of ticks from one pose to the next; 1: a pose in every tick. Poses of other
+    /// ticks are possible, but cost more.
     int ticks_apart = 1;
     /// True: only poses with layers are needed, so replicas without layers are not evaluated.
     bool only_layered = false;
@@ -87,8 +88,8 @@ class AvatarReplica {
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
-  /// A number that changes whenever a record begins, ends or sets a movement. While it stays the
-  /// same, the movement does not change.
+  /// A number that changes whenever a record starts, ends or replaces a movement. While it stays
+  /// the same, the movement does not change.
   [[nodiscard]] std::uint32_t movement_number() const { return movement_number_; }
   /// Time at which the previous movement ended when this one began. Negative if the movement did
   /// not begin at the end of another one.
@@ -130,7 +131,8 @@ class AvatarReplica {
   bool is_time_set_ = false;
   bool are_layers_set_ = false;
   bool may_have_layers_ = false;  // False: neither the body nor its displayed pose has layers.
-  // Number of poses that have been evaluated ahead, without layers, and the ticks between them.
+  // Number of poses that have been evaluated ahead, without layers, and the number of ticks from
+  // one of them to the next.
   std::uint32_t ahead_count_ = 0;
   std::uint32_t ahead_ticks_apart_ = 1;
   std::uint32_t ahead_tick_ = 0;  // Number of ticks since the first of the poses evaluated ahead.

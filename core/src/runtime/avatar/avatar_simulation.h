@@ -55,9 +55,9 @@ struct AvatarChange {
 /// Time is an argument; only Advance moves the avatar. The same library, start, requests and time
 /// steps give the same pose bytes on every machine. Not thread-safe; one owner.
 ///
-/// After construction, only these calls allocate: Enqueue, for a queue of up to kMaxQueue requests;
-/// calls that drop requests; SetLayer; the first Advance; and an Advance with more events than any
-/// before.
+/// After construction, only these calls allocate: Enqueue, because the queue may grow to kMaxQueue
+/// requests; calls that drop requests; SetLayer; the first Advance; and an Advance with more events
+/// than any before.
 class AvatarSimulation {
  public:
   static constexpr int kMaxQueue = Avatar::kMaxQueue;
@@ -80,8 +80,9 @@ class AvatarSimulation {
   /// another movement ends, it is not delayed. A delay of an earlier request is not extended.
   [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
 
-  /// Drops the requests that have not started and returns their number. The current movement
-  /// continues to its end. A walk in progress is dropped after its current step.
+  /// Drops the requests in the queue, including a walk in progress, and returns their number. The
+  /// current movement continues to its end. The drop of a walk in progress is reported after its
+  /// current step.
   int CancelQueue();
 
   /// Drops the queue and the request of the current movement. Call it only before removing or
@@ -102,8 +103,8 @@ class AvatarSimulation {
 
   /// Enables or disables foot planting from the next movement on, without a visible jump. Until
   /// that movement starts, swings are not redirected. While planting is disabled, queued requests
-  /// for exact placement are rejected when they would start. Fails with kUnsupported if the
-  /// skeleton does not support foot planting.
+  /// for exact placement are rejected when they would start. Enabling it fails with kUnsupported if
+  /// the skeleton does not support foot planting.
   [[nodiscard]] Status SetFootPlanting(bool enabled);
   /// The last setting. False if the skeleton does not support foot planting.
   [[nodiscard]] bool foot_planting() const {
@@ -177,7 +178,8 @@ class AvatarSimulation {
   [[nodiscard]] const AvatarEvent* started() const {
     return is_moving_ || is_in_stand_ ? &started_ : nullptr;
   }
-  /// The requests that have not started, in order.
+  /// The requests that have not started, in order. While a walk is in progress, it is the first of
+  /// them.
   [[nodiscard]] std::span<const MovementRequest> queue() const {
     return std::span(queue_).subspan(queue_head_);
   }

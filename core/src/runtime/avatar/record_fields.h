@@ -35,9 +35,10 @@ enum Flag : std::uint16_t {
   kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; the record contains lift_m and normal.
   kMidSwingOffset = 1 << 13,  // The record contains LandingDecision::mid_swing_offset_m.
   kRootShift = 1 << 14,       // The record contains LandingDecision::root_shift_m.
-  // Change: the movement that began has a Movement::rate other than 1, which the record contains.
+  // In a change: the movement that began has a Movement::rate other than 1, which the record
+  // contains.
   kHasRate = 1 << 15,
-  // State of a standing avatar: the value of AvatarBody::begins_planting.
+  // In the state of a standing avatar: the value of AvatarBody::begins_planting.
   kBeginsPlanting = 1 << 15,
 };
 

@@ -61,8 +61,8 @@ struct CardinalBasisFit {
   /// weights sum to 1 away from the sites even if the examples do not span all parameters. The
   /// dilation of an example is the distance to the nearest other example, that of a pseudoexample
   /// the distance to the nearest site. If examples used the nearest site as well, every added
-  /// pseudoexample would shrink their radii. The least-squares solution has minimum norm;
-  /// directions with a relative weight below 1e-9 are ignored.
+  /// pseudoexample would shrink their radii. The least-squares solution has minimum norm. In its
+  /// decomposition, pivots below 1e-9 of the largest one count as zero.
   ///
   /// Errors: kShapeMismatch if the sizes of the spans do not match. kOutOfRange if a number is not
   /// finite, or if a scale or radius factor is not positive. kIllConditioned if two sites are

@@ -65,13 +65,14 @@ class TimeWarp {
   [[nodiscard]] std::vector<double> Keytimes() const;
   [[nodiscard]] double duration_s() const { return keytime_s(interval_count_); }
 
-  /// The piece of the map between two keytimes.
+  /// A segment of the map, between two successive keytimes.
   struct Piece {
     double begin_s, end_s;          ///< Keytimes at both ends.
     double begin, end;              ///< Grid positions at both ends.
     double begin_slope, end_slope;  ///< Grid positions per second at both ends.
   };
-  /// Returns the piece that contains `time_s`, or the first or last piece for times outside.
+  /// Returns the segment that contains `time_s`, or the first or last segment for times outside the
+  /// movement.
   [[nodiscard]] Piece PieceAt(double time_s) const {
     std::size_t i = 0;
     for (int k = 1; k < interval_count_; ++k) {

@@ -63,7 +63,7 @@ struct FootPlanJob {
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingTarget& target);
 
 /// Repeats a plan from its decisions, with the same bits. Does not use the heading change of the
-/// movement, which replicas do not know.
+/// movement, which records do not contain.
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingDecision& decision);
 
 /// Sets FootTrajectory::settle_lift_m of a planned step on level ground, so that its standing feet

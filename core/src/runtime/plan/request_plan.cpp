@@ -17,7 +17,7 @@ namespace {
 // Costs are in metres. They are distances between the requested parameters and those that a group
 // can produce, multiplied by a weight per parameter.
 
-// The positions of the feet dictate the start, so it has a larger weight than the end.
+// The positions of the feet determine the start, so it has a larger weight than the end.
 constexpr double kStartWeight = 4.0;
 // Weight of a parameter that the request does not specify. It is small, so that the parameter
 // follows the others.

@@ -85,8 +85,9 @@ inline constexpr double kHullGrowth = 0.1;
 inline constexpr double kMaxPlantedErrorM = 0.6;
 
 /// Plans a step in the group that covers it best, with parameters clamped to the hull of the group.
-/// The feet dictate the start, which has a larger weight than the end. If a group has no parameter
-/// for a requested turn, side or height, the whole value counts as the error.
+/// The positions of the feet determine the start parameters, which have a larger weight than those
+/// of the end. If a group has no parameter for a requested turn, side or height, the whole value
+/// counts as the error.
 ///
 /// If the request does not specify a foot, the foot other than `last_moved` moves. If the avatar is
 /// `standing` and `last_moved` fits better, that foot moves. If `after` is set, only groups that
@@ -98,8 +99,9 @@ inline constexpr double kMaxPlantedErrorM = 0.6;
                                                   std::optional<std::size_t> after = std::nullopt);
 
 /// Returns true if a movement of group `to` may follow one of group `from`. Their
-/// Transition::distance_m must be at most 0.15 m, or at most 1.5 times the distance between `to`
-/// and the stand. After a stand, whose index is the number of groups, every movement is possible.
+/// Transition::distance_m must be at most 0.15 m, or at most 1.5 times that from the stand to `to`.
+/// Also returns true if `from` is the stand, whose index is the number of groups, or if the library
+/// contains no transitions.
 [[nodiscard]] bool MayFollow(const MotionLibrary& library, std::size_t from, std::size_t to);
 
 /// Origin of a footprint. A walk can choose another footprint if no step fits; a request cannot.

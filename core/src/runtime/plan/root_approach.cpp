@@ -19,8 +19,8 @@ constexpr double kMaxApproachS = 0.8;
 constexpr double kVerticalWeight = 0.4;
 // On terrain the blend is shorter, because a climbing or descending leg has less reach to spare.
 constexpr double kMaxTerrainApproachS = 0.35;
-// In strides the blend is shorter, too. Otherwise, the pelvis would lag behind when it passes the
-// standing foot, where each centimetre bends the knee by several degrees.
+// In strides, the blend is shorter as well. Otherwise, the pelvis would lag behind when it passes
+// the standing foot, where each centimetre bends the knee by several degrees.
 constexpr double kMaxStrideApproachS = 0.35;
 constexpr double kApproachStepS = 0.02;
 constexpr double kApproachToleranceS = 1e-7;
@@ -63,7 +63,8 @@ double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least
 }
 
 // Returns true if the feet are apart in the walking direction at the start and end of a step. Uses
-// the heading at the start for both, because replicas do not know by how much the examples turn.
+// the heading at the start for both, because records do not contain the heading change of the
+// examples.
 bool IsStride(const FootPlan& plan, double heading_rad) {
   const auto ahead_m = [&](const Footprint& left, const Footprint& right) {
     return std::fabs(RotateYaw(-heading_rad, left.position_m - right.position_m).z);

@@ -33,8 +33,8 @@ struct WalkProgress {
   int steps_without = 0;  ///< Number of successive steps without progress.
   /// Minimum of the remaining effort so far (WalkSteering::EffortM).
   double least_effort_m = std::numeric_limits<double>::infinity();
-  /// True if a step of this walk was changed because the ground at its footprint does not support a
-  /// foot.
+  /// True if the terrain has ruled out a footprint of this walk: the ground at it is too steep or
+  /// too uneven, or the ground at or before it is too high or too low.
   bool is_detour = false;
   /// [foot]: as in WalkStance.
   std::array<bool, 2> is_aimed{};
@@ -72,8 +72,9 @@ struct WalkDecision {
   const char* reason = "";
 };
 
-/// Limits of a walk. It ends after kMaxStepsWithout successive steps without progress. If it makes
-/// a detour around ground that does not support a foot, it ends after kMaxDetourSteps such steps.
+/// Limits of a walk. It ends after kMaxStepsWithout successive steps without progress. If the
+/// terrain has ruled out a footprint (WalkProgress::is_detour), it ends after kMaxDetourSteps such
+/// steps.
 inline constexpr int kMaxWalkSteps = 10'000;
 inline constexpr int kMaxStepsWithout = 2;
 inline constexpr int kMaxDetourSteps = 16;

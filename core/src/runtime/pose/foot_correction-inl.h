@@ -191,7 +191,7 @@ STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timi
   const Number rise = EaseOut(since_s / Max(Constant<Number>(kRootShiftS),
                                             Constant<Number>(kRootRisePart) * timing.duration_s));
   // The difference pose still displaces the root by the fraction `blended` of the approach. The
-  // displacement should be the fraction `part`, so only the difference of both is added.
+  // required fraction is `part`, so only the rest, `part - blended`, is added.
   const Number faded = timing.OfEaseOut(since_s);
   const Number blended = EaseOut(faded);
   const Number blended_s = timing.ease_out_s * EaseOutSlope(faded);

@@ -78,9 +78,9 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement);
 
-/// Starts to fade in the changes due to planting in a planned movement (FootPlan::plant_fade_s).
-/// `displayed` is the pose at its start, which has no planted feet and is also the blended pose at
-/// that time. `pose` is scratch memory of the same size.
+/// Prepares the plant fade of a planned movement (FootPlan::plant_fade_s): the movement starts with
+/// the pose `displayed`, and the changes due to planting fade in. `displayed` has no planted feet
+/// and equals the blended pose at the start. `pose` is scratch memory of the same size.
 void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose);
 
 /// Final step of planting: adds the remaining part of the plant fade (FootPlan::plant_fade_s).

@@ -19,7 +19,7 @@ struct SampleRun {
   /// Length of a tick in seconds. The times of poses are summed tick by tick, as in a server, so
   /// that rounding is the same.
   double step_s = 0.0;
-  int ticks_apart = 1;  ///< Ticks between two poses.
+  int ticks_apart = 1;  ///< Number of ticks from one pose to the next.
 };
 
 /// Evaluates up to SoaPose::kLanes sample runs side by side, with difference poses and planted

@@ -12,9 +12,10 @@ bool IsFinite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Catmull-Rom weights of the four samples around position `u`, in [0, 1), of the middle interval.
-// The sample before the first one is extrapolated linearly as 2 p_0 - p_1. Its weight is added to
-// the weights of the two samples that define it. The same applies at the end.
+// Catmull-Rom weights of four successive samples, for the position `u`, in [0, 1), between the two
+// middle ones. A sample before the start of the clip is extrapolated linearly as 2 p_0 - p_1. Its
+// weight is added to the weights of the two samples from which it is extrapolated. The same applies
+// at the end.
 struct CubicWeights {
   float w[4];
 

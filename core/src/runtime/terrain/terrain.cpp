@@ -135,8 +135,8 @@ Status Terrain::IndexBoxes() {
     const auto cells_z = 1 + CellOf(depth / cell, kMaxIndexCellsPerAxis);
     if (!TryIndex(cells_x, cells_z)) {
       if (!starts_.empty()) break;  // Keeps the previous, coarser index.
-      // A mixture of large and many small boxes would need too many entries. Coarser cells need
-      // fewer, and a single cell always fits.
+      // With a few large and many small boxes, the index would need too many entries. Coarser cells
+      // need fewer, and a single cell always fits.
       is_coarser_needed = true;
       cell *= 2.0;
       continue;
