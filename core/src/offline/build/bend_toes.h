@@ -11,7 +11,8 @@
 namespace stridewire {
 
 /// Toe tips may stay this far below the height at which they rest on the ground. If they were
-/// raised to that height, toes would hover in blends of steps whose resting toes differ.
+/// raised to the full height, toes would hover in blends of steps whose toes rest at different
+/// heights.
 inline constexpr double kMaxToeSinkM = 0.005;
 
 /// If the toe tip of a foot is below `height_m` (in the frame of the pose), bends the toes upward

@@ -4,7 +4,8 @@
 
 namespace stridewire::builtin {
 
-/// Frame rate of generated clips. Keytimes are whole frames, so every state is a frame.
+/// Frame rate of generated clips. Keytimes are rounded to whole frames, so the GaitStates at the
+/// start and the end of a step coincide with frames.
 inline constexpr double kClipFps = 120.0;
 
 /// Rounds a time to whole frames.

@@ -7,9 +7,9 @@
 
 namespace stridewire::builtin {
 
-/// The timing of a step between two states, with keytimes start, toe-off, heel-strike and end.
-/// Double support around a state is symmetric and independent of the step, so that successive steps
-/// have equal velocities in the state between them.
+/// The timing of a step between two GaitStates, with keytimes start, toe-off, heel-strike and end.
+/// While walking, double support around a GaitState is symmetric and does not depend on the step,
+/// so two successive steps have the same velocities in the state that they share.
 struct StepTiming {
   StepShape shape;
   GaitState start;

@@ -57,7 +57,7 @@ class FigureBuilder {
     bool is_attached = false;
   };
 
-  // Finds the legs of every root of the file, and selects the first one that has legs.
+  // Finds the legs of every root of the file, and selects the root of the figure.
   Status SelectFigure() {
     std::vector<int> roots;
     for (int j = 0; j < static_cast<int>(file_.joints.size()); ++j) {

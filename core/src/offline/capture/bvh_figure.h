@@ -21,8 +21,8 @@ struct AveragedJoint {
   double deviation = 0.0;  ///< Largest distance from the mean in any frame, in file units.
 };
 
-/// The figure of a BVH file with its motion, in the axes and the unit of the file. The root is the
-/// lowest joint above both legs and the upper body. It contains the motion of all joints above it.
+/// The figure of a BVH file with its motion, in the axes and the unit of the file. ReadBvh
+/// describes which joint is its root. The root contains the motion of all joints above it.
 struct BvhFigure {
   std::vector<Joint> joints;
   std::vector<EndSite> end_sites;

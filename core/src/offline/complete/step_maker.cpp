@@ -581,7 +581,7 @@ class StepGenerator {
   double lift_m_ = 0.0;
   PostureSample sample_;      // The captured stride at the current time.
   std::vector<DQuat> mixed_;  // Scratch memory of SetPosture.
-  // Joints on which hips and feet depend, except for those which inverse kinematics sets.
+  // Joints on which hips and feet depend, except for those that inverse kinematics sets.
   std::vector<std::size_t> reach_joints_;
 };
 

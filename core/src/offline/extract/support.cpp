@@ -22,7 +22,7 @@ constexpr double kPelvisAboveShare = 0.3;
 constexpr double kSwingBelowM = 0.03;
 // Minimum time for which a foot must carry the figure alone, or be as low as the other foot.
 constexpr double kAloneMinS = 0.05;
-// A foot counts as low if it is at most this much above the other one.
+// A foot counts as being as low as the other one if it is at most this much higher.
 constexpr double kAsLowM = 0.05;
 // A higher foot carries weight if it is still for kLoadMinS and if the pelvis is at least
 // kLoadShare of the way from the lower to the higher foot.
