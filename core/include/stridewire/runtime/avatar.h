@@ -58,8 +58,8 @@ struct StepMeasures {
 /// Describes by how much a rejected step or jump would have missed its request. For steps with
 /// `exact_only` the values are exact. For others, they are accurate to a few centimetres.
 struct FootprintError {
-  /// Nearest footprint in reach. For a jump: the midpoint between the feet and the heading of the
-  /// avatar after the nearest jump.
+  /// Nearest footprint in reach. For a jump: position and heading of the base frame after the
+  /// nearest jump.
   Footprint nearest;
   double distance_m = 0.0;  ///< Distance from `nearest` to the requested place, >= 0.
   /// The larger of two angles: between the directions of the requested and the nearest path, and
@@ -168,10 +168,12 @@ class Avatar {
   Avatar(Avatar&&) noexcept;
   Avatar& operator=(Avatar&&) noexcept;
 
-  /// Validates and queues a request. A request with an interrupt first empties the queue.
+  /// Validates and queues a request. A request with an interrupt replaces the queue. On error,
+  /// nothing changes.
   ///
   /// Errors: those of ValidateRequest; kUnsupported if exact placement is requested while feet are
-  /// not planted; kLimitExceeded if the queue contains kMaxQueue requests.
+  /// not planted; kLimitExceeded if the queue contains kMaxQueue requests, even if the request has
+  /// an interrupt.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
   /// Drops the requests in the queue and returns their number. A walk in progress is one of them.

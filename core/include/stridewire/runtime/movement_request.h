@@ -91,8 +91,9 @@ enum class Interrupt : std::uint8_t {
   /// The request begins after the current step or jump. A current stand ends at once, and a walk
   /// ends after its current step. The queue is dropped.
   kAfterMovement,
-  /// The request begins at once if both feet stand, and otherwise as soon as they have landed. The
-  /// queue is dropped.
+  /// The request begins at once if both feet stand, and otherwise as soon as they have landed. A
+  /// jump in progress continues to its landing. A stand waits for the end of a step that brings the
+  /// feet together. The queue is dropped.
   ///
   /// The current step changes if more than 40 % of its swing remains. If the request is a step of
   /// the swinging foot, or a walk that begins with one, the foot is redirected to the new
