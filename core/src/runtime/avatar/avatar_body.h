@@ -26,7 +26,9 @@ struct AvatarBody {
   /// True if the current movement plants the feet. While the avatar stands still: true if its feet
   /// were planted when it came to rest.
   bool plants_feet = false;
-  bool begins_planting = false;  ///< True if the next movement is the first one with planted feet.
+  /// True if the changes due to planting fade in during the next movement (FootPlan::plant_fade_s),
+  /// because it is the first one with planted feet or because an earlier fade was interrupted.
+  bool begins_planting = false;
   /// Pose that the next movement blends from, without planting. Set when the movement ends or is
   /// interrupted.
   Pose blended_pose;

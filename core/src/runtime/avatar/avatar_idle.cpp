@@ -4,7 +4,7 @@
 //
 // Settle and idle are movements with a separate group (StandMotion), so that evaluation, planting,
 // blends, replicas and caches treat them like steps. To the caller, the avatar stands: these
-// movements cause no events, and any request ends them at once.
+// movements cause no events, and a step, jump or walk that begins ends them at once.
 
 #include <array>
 #include <cmath>

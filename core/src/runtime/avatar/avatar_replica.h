@@ -61,8 +61,9 @@ class AvatarReplica {
   /// time.
   ///
   /// Errors: kMalformed if the record is invalid, or does not fit the library or the current state.
-  /// kNotFound if a change arrives before any state. Error::index is the offset in the record.
-  /// After an error, the avatar's state is unknown until the next record with a whole state.
+  /// kNotFound if a change arrives while the state is unknown. Error::index is the offset in the
+  /// record. After an error, the avatar's state is unknown until the next record with a whole
+  /// state.
   [[nodiscard]] Status Apply(std::span<const std::byte> record, FootPlanScratch& scratch);
 
   /// Advances replicas by one tick and evaluates their poses if the tick has poses. All must have
@@ -74,7 +75,7 @@ class AvatarReplica {
                          ReplicaEvaluator& evaluator);
 
   /// Does the same as AdvanceAll for this number of ticks without poses. The replica must have a
-  /// movement and no layers.
+  /// movement and no layers, and AdvanceAll must have been called since the last record.
   void SkipTicks(std::uint64_t ticks, double length_s);
 
   /// True if the replica has received a state, and no error has occurred since then.
@@ -88,11 +89,11 @@ class AvatarReplica {
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
-  /// A number that changes whenever a record starts, ends or replaces a movement. While it stays
-  /// the same, the movement does not change.
+  /// A number that changes whenever a record contains a whole state, or starts or ends a movement.
+  /// While it stays the same, the movement does not change.
   [[nodiscard]] std::uint32_t movement_number() const { return movement_number_; }
-  /// Time at which the previous movement ended when this one began. Negative if the movement did
-  /// not begin at the end of another one.
+  /// Time within the previous movement at which it ended or was interrupted when this one began.
+  /// Negative if this movement did not directly follow another one.
   [[nodiscard]] double previous_end_s() const { return previous_end_s_; }
   /// Time from the start of the movement to the last tick. Undefined while standing.
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }

@@ -294,7 +294,8 @@ bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   return true;
 }
 
-// Starts the step or jump at the head of the queue, or a step that must precede it.
+// Starts the step or jump at the head of the queue, or a step that must precede it. If the request
+// is out of reach or no path leads to it, rejects it.
 void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch) {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
@@ -309,8 +310,8 @@ void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch
   } else if (path.plan) {
     const MovementRequest taken = request;
     PopQueue();
-    // A jump that interrupts a walk starts at a later phase, because a moving body needs less
-    // preparation.
+    // A jump that interrupts another movement starts at a later phase, because a moving body needs
+    // less preparation.
     const double start_phase =
         is_hurried && body_.library->group(path.plan->group).kind == MovementKind::kJump
             ? kJumpStartPhase

@@ -70,10 +70,11 @@ class AvatarSimulation {
   /// A swing is redirected only if more than this fraction of it remains.
   static constexpr double kLeastSwingLeft = 0.4;
 
-  /// Validates and queues a request. A request with an interrupt first empties the queue.
+  /// Validates and queues a request. A request with an interrupt replaces the queue. On error,
+  /// nothing changes.
   ///
   /// Errors: those of ValidateRequest; kUnsupported if exact placement is requested while feet are
-  /// not planted; kLimitExceeded if the queue is full.
+  /// not planted; kLimitExceeded if the queue is full, even if the request has an interrupt.
   ///
   /// `start_delay_s` (>= 0) delays the start. A standing avatar begins the request after this delay
   /// at the earliest, and a moving avatar is not interrupted earlier. If the request begins when

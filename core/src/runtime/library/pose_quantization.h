@@ -20,9 +20,9 @@ struct RotationRange {
   double least_w = 0.0;
 };
 
-/// Finds the range of each joint over the examples, layers and stand pose of a library. The ranges
-/// include wide margins, because avatars blend movements, plant feet and ease from one movement
-/// into the next. The root may rotate in any direction.
+/// Finds the range of each joint over the examples, layers, stand pose and idle motion of a
+/// library. The ranges include wide margins, because avatars blend movements, plant feet and ease
+/// from one movement into the next. The root may rotate in any direction.
 [[nodiscard]] std::vector<RotationRange> FindRotationRanges(const MotionLibrary& library);
 
 /// Quantization parameters for all joints of a skeleton.
@@ -40,8 +40,8 @@ struct PoseQuantization {
 /// of those above it. The angular error of a joint then moves only its own bone, and the total
 /// error is bounded by the sum of bone length times angle over a chain. No angle has an error of
 /// more than 0.23 degrees. `largest_error_m` of the result exceeds the requested one only if all
-/// joints have the maximum number of bits. This happens only with bones of many metres. `ranges`
-/// has one entry per joint. The result is the same on every machine.
+/// joints above some joint or end site have the maximum number of bits. This happens only with
+/// bones of many metres. `ranges` has one entry per joint. The result is the same on every machine.
 [[nodiscard]] PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton,
                                                       std::span<const RotationRange> ranges,
                                                       double largest_error_m);

@@ -38,8 +38,9 @@ struct FootTrajectory {
   /// An additional height that keeps the sole of a step's supporting foot on the ground:
   /// coefficients of u, u^2, u^3 and u^4, where u is the elapsed fraction of the movement.
   std::array<double, 4> level_m{};
-  /// Peak of an additional height while the difference pose fades out. Without it the foot would
-  /// sink, because the rotations of the legs and the height of the root fade differently.
+  /// Peak of an additional height while the difference pose fades out; negative if the foot has to
+  /// be lowered. Without it, the foot would sink or hover, because the rotations of the legs and
+  /// the height of the root fade differently.
   double settle_lift_m = 0.0;
   /// True if the height of the ball is locked to the footprint as well. A standing avatar needs
   /// this, because its legs straighten while its feet must stay on the ground.
@@ -81,7 +82,7 @@ struct FootResidual {
 struct RootApproach {
   DVec3 offset_m = DVec3(0.0);    ///< Displacement of the root due to the rotations of the legs.
   DVec3 offset_m_s = DVec3(0.0);  ///< Velocity of this displacement at the start of the movement.
-  /// Duration. If it is less than Movement::ease_out_s, there is no additional motion.
+  /// Duration. If it is at most Movement::ease_out_s, there is no additional motion.
   double over_s = 0.0;
 };
 

@@ -16,7 +16,7 @@
 
 namespace stridewire {
 
-/// Maximum turn of a movement in addition to that of its examples, to either side.
+/// Default of RequestPlan::max_extra_turn_rad. Steps of walks may turn further (StepPlanner).
 inline constexpr double kMaxExtraTurnRad = 0.3;
 
 /// Limits on the playback speed of a movement.

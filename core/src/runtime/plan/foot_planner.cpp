@@ -55,7 +55,7 @@ constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 // A landing foot may briefly be this far below the ground.
 constexpr double kMaxLandingSinkM = 0.008;
 
-// While the difference pose fades out, standing feet are lifted by at most this.
+// While the difference pose fades out, standing feet are lifted or lowered by at most this.
 constexpr double kMaxSettleLiftM = 0.05;
 
 double ValueOr(const MotionGroup& group, const ParameterValues& values, ParameterName name,
@@ -336,7 +336,8 @@ class Planner {
   }
 
   // Lifts standing feet so that their balls and ankles do not sink into level ground while the
-  // difference pose fades out. The lift is limited so that soles do not hover.
+  // difference pose fades out. The lift is limited so that soles do not hover. It may be negative
+  // for a foot that stands throughout the movement.
   void LiftWhileSettling() {
     const FootSampler& feet = transition_.feet();
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

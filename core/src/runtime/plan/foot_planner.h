@@ -39,7 +39,7 @@ struct BlendSource {
 /// Maximum angle by which planting turns the landing foot of the library's step to match a
 /// requested footprint. RequestPlan::most_residual_m is the corresponding limit for its position.
 inline constexpr double kMaxFootTurnRad = 0.35;
-/// Maximum shift of the root for a step that ends in a stand.
+/// Maximum shift of the root towards RequestPlan::root_m.
 inline constexpr double kMaxRootShiftM = 0.4;
 
 /// Input and output of PlanFeet.
@@ -67,8 +67,8 @@ std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingTarget& targ
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingDecision& decision);
 
 /// Sets FootTrajectory::settle_lift_m of a planned step on level ground, so that its standing feet
-/// do not sink while the difference pose fades out. Call it after setting the residuals of the
-/// plan.
+/// neither sink nor hover while the difference pose fades out. Call it after setting the residuals
+/// of the plan.
 void LiftWhileSettling(const FootPlanJob& job);
 
 }  // namespace stridewire

@@ -72,8 +72,8 @@ struct FeetCorrection {
 /// Sets the residuals of a movement's plan so that the corrections continue smoothly. `before`
 /// contains the corrections of the previous movement at the start of this one, and kBlendStepS
 /// earlier. `planned` contains those of the plan at the start, and kBlendStepS later. `blended`
-/// contains the feet without corrections at those times. Two equal elements mean zero velocity. If
-/// a foot has just landed, its descent stops.
+/// contains the feet without corrections at those times. Two equal elements mean zero velocity. A
+/// foot on the ground continues to descend at 0.5 m/s at most.
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement);
