@@ -17,8 +17,8 @@ inline constexpr double kStoredErrorRad = 0.45 / 57.29577951308232;
 
 // Chooses the number of grid cells per keytime interval for a group of valid examples. Starts with
 // the result of CellsAtRate for `fps`, and adds cells until no example is stored with an error
-// above kStoredErrorRad. More cells are needed for slow examples in a group of fast ones, and
-// for captures with fast rotations: with 30 cells per second, steps of subject 01 have a mean error
+// above kStoredErrorRad. More cells are needed for slow examples in a group of fast ones, and for
+// captures with fast rotations: with 30 cells per second, steps of CMU subject 01 have a mean error
 // of 0.6 degrees and up to 1.2. The number is limited by the frames of the longest example and by
 // the size of the grid. Generated steps are not measured, since they are smooth. `stand_root`: see
 // ResampleOnGrid.

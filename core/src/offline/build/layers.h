@@ -27,8 +27,8 @@ inline constexpr double kLoopBlendS = 0.4;
 [[nodiscard]] std::vector<float> UpperBodyMask(const Skeleton& skeleton);
 
 /// Returns a mask with weight 1 for the named joints and all joints below them. Errors, with the
-/// name in Error::where: kNotFound if the joint does not exist, kInvalidArgument for the root or a
-/// joint above a leg.
+/// name in Error::where: kNotFound if the joint does not exist, kInvalidArgument for the root and
+/// for a joint of a leg or above one.
 [[nodiscard]] Expected<std::vector<float>> MaskOfJoints(const Skeleton& skeleton,
                                                         std::span<const std::string> names);
 
@@ -46,8 +46,8 @@ struct LayerCut {
 /// shortens the loop by this time.
 ///
 /// Errors, with details in Error::where: kShapeMismatch if the joints differ from the skeleton,
-/// kInvalidArgument for an invalid name, kOutOfRange for times outside the capture or a cut shorter
-/// than 0.1 s.
+/// kOutOfRange for times outside the capture or a cut shorter than 0.1 s. Does not check the name;
+/// StoreLayers does.
 [[nodiscard]] Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton,
                                           const LayerCut& cut);
 

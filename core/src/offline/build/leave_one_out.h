@@ -44,11 +44,12 @@ struct LeaveOneOut {
 };
 
 /// Leaves out each example of a group, synthesizes a movement with its parameters from the others
-/// and compares it with the example. kCardinal works as in avatars: near duplicates are averaged
-/// (see CompleteLinkage; a radian counts as kMetresPerRadian), parameters are projected onto the
-/// hull of the others, enlarged by 10 %, and weights are corrected. Distances of parameters are
-/// scaled as for the weights. Uses all processors; the result does not depend on their number.
-/// Groups with fewer than three examples give an empty result (movements 0).
+/// and compares it with the example. kCardinal works as in libraries and avatars: near duplicates
+/// are averaged (see CompleteLinkage; a radian counts as kMetresPerRadian), the others are smoothed
+/// if there are enough of them (ChooseSmoothness), parameters are projected onto the hull of the
+/// others, enlarged by 10 %, and weights are corrected. Distances of parameters are scaled as for
+/// the weights. Uses all processors; the result does not depend on their number. Groups with fewer
+/// than three examples give an empty result (movements 0).
 [[nodiscard]] LeaveOneOut MeasureLeaveOneOut(const MotionLibrary& library, int group_index,
                                              double cluster_diameter_m = 0.05);
 

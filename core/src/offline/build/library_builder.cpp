@@ -360,11 +360,11 @@ LibraryBuilder LibraryBuilder::KeepingAll() {
 }
 
 // Captured steps with equal parameters differ by centimetres. Without averaging, weights would
-// change abruptly between them. The error bound of 2.5 cm is a compromise: of subject 16, it keeps
-// one fifth of the straight and half of the general steps, and these reproduce left-out steps as
-// well as all steps do. A bound of 4 cm reproduces them 5 to 10 % worse. The outlier limit of five
-// deviations drops a recovery after a jump and the last step before a sharp turn. A limit of three
-// would also drop the first steps of walks.
+// change abruptly between them. The error bound of 2.5 cm is a compromise: of CMU subject 16, it
+// keeps one fifth of the straight and half of the general steps, and these reproduce left-out steps
+// as well as all steps do. A bound of 4 cm reproduces them 5 to 10 % worse. The outlier limit of
+// five deviations drops a recovery after a jump and the last step before a sharp turn. A limit of
+// three would also drop the first steps of walks.
 LibraryBuilder LibraryBuilder::Selecting() {
   LibraryBuilder builder = KeepingAll();
   builder.cluster_diameter = 0.05;

@@ -98,7 +98,7 @@ struct Refinement {
 /// error grows. RefineRule::kAmended keeps the condition number below kMaxRefinedCondition and the
 /// sum of |w| below kMaxRefinedWeightSum. It runs the following passes until one reaches
 /// max_error_m. If none does, it uses the pass whose largest error, measured with samples of
-/// another seed, is smallest.
+/// another seed, is smallest. If that error is larger than without pseudoexamples, it adds none.
 ///
 /// 1. The radii of the examples are constant. Sites that do not reduce the error are rejected.
 /// 2. Radii shrink, and every site is added. Finally, the sites added after the best state are
@@ -108,7 +108,8 @@ struct Refinement {
 ///
 /// Existing pseudoexamples are removed first.
 ///
-/// Errors: kOutOfRange for an option. kUnsupported, "stopped", if `progress` returned false.
+/// Errors: kOutOfRange for an option. With the group in Error::where: kUnsupported, "stopped", if
+/// `progress` returned false, and the errors of CardinalBasisFit::Run.
 [[nodiscard]] Expected<Refinement> Refine(const std::shared_ptr<const MotionLibrary>& library,
                                           const RefineOptions& options = {});
 
