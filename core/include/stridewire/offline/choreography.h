@@ -14,13 +14,15 @@
 
 namespace stridewire {
 
-/// Limits on a choreography. A file that exceeds one of them is rejected with kLimitExceeded.
+/// Limits on a choreography. A file that exceeds one of these three is rejected with
+/// kLimitExceeded.
 inline constexpr std::size_t kMaxChoreographyBytes = std::size_t{4} << 20;
 inline constexpr std::size_t kMaxChoreographyMovements = 65'536;
 inline constexpr int kMaxChoreographyDepth = 16;  ///< Maximum depth of nested JSON values.
-/// Maximum magnitude of a start coordinate.
+/// Maximum magnitude of every coordinate in a choreography. Larger ones are rejected with
+/// kOutOfRange.
 inline constexpr double kMaxChoreographyPositionM = 1e5;
-/// Maximum magnitude of the start heading.
+/// Maximum magnitude of every heading in a choreography. Larger ones are rejected with kOutOfRange.
 inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 
 /// A start position and a list of movements that an avatar plays one after the other. As JSON:
@@ -45,7 +47,7 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 /// - step: requires either `length_m`, with optional side, height and turn, or `at_m`, the world
 ///   position where the ball of the foot lands. With `at_m`, `heading_rad` of the footprint is
 ///   optional. With `exact_only`, the step is skipped unless the foot lands exactly at the
-///   requested place.
+///   requested place. It cannot be combined with `allow_nearest`.
 /// - step and jump: skipped if the nearest movement of the library misses the request by more than
 ///   0.2 m or 60 degrees. With `"allow_nearest": true`, that movement is played.
 /// - walk_to: requires `position_m` and `heading_rad`.
@@ -56,8 +58,8 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 struct Choreography {
   BaseFrame start;
   std::shared_ptr<const Terrain> terrain;  ///< Terrain of the world; null: flat ground.
-  /// Together with `layers`, 1 to kMaxChoreographyMovements entries. The id of a request is its
-  /// position in the JSON list, counted from 1 and including layers.
+  /// At least one entry and, together with `layers`, at most kMaxChoreographyMovements. The id of a
+  /// request is its position in the JSON list, counted from 1 and including layers.
   std::vector<MovementRequest> movements;
   std::vector<LayerCue> layers;
 };
@@ -65,9 +67,11 @@ struct Choreography {
 /// Reads a choreography. Checks numbers against the limits in movement_request.h, but not whether a
 /// library supports the movements. For that, use ValidateRequest.
 ///
-/// Errors: kNotFound or kIo, with the file in Error::where. kMalformed, with "file:line:column", if
-/// the text is not JSON. kMalformed, kOutOfRange, kShapeMismatch or kUnsupported, with the field,
-/// for example "c.json: movements[3].step.length_m". kLimitExceeded, with the file or the field.
+/// Errors: kNotFound or kIo, with the file in Error::where. With "file:line:column": kMalformed if
+/// the text is not JSON, kOutOfRange for a number too large for a double, kLimitExceeded if values
+/// are nested too deeply. kMalformed, kOutOfRange, kShapeMismatch or kLimitExceeded, with the
+/// field, for example "c.json: movements[3].step.length_m". kLimitExceeded, with the file, if it is
+/// too large.
 [[nodiscard]] Expected<Choreography> ReadChoreography(const std::filesystem::path& path);
 
 /// Same as ReadChoreography, for text in memory. `name` replaces the path in errors.

@@ -30,10 +30,11 @@ inline constexpr Vec3 kBuiltinHeelOffsetM = Vec3(0.0f, -0.06825f, -0.06f);
 ///   up, down  30 each (start_y, start_z, end_y, end_z, turn): 0.125 and 0.25 m per foot, from
 ///             and to level ground and on stairs, turns of 35 degrees to both sides
 ///
-/// A state is a pose and a velocity in the middle of double support, with the feet a given length
-/// apart. All examples that end in a state have the same final pose. All examples that start in it
-/// have this pose as their initial pose (mirrored if the other foot leads). Steps therefore follow
-/// each other without discontinuity.
+/// A state is a pose and a velocity in the middle of double support. It depends on the distance
+/// between the feet and on the style of the step (StepStyle). All examples that end in a state and
+/// do not turn have the same final pose. All examples that start in it have this pose as their
+/// initial pose (mirrored if the other foot leads). Steps of one style therefore follow each other
+/// without discontinuity.
 ///
 /// First the feet are placed: heel, flat foot, ball and toe tip are exactly fixed on the ground.
 /// Then the pelvis follows, then the legs by inverse kinematics, then the rest of the body. The set

@@ -34,8 +34,9 @@ struct FootPose {
 ///   moving  toe pivot  | swing ..................... | heel pivot
 ///           start    toe-off                    heel-strike    end
 ///
-/// "Heel pivot" means that the foot turns about its heel, which stays on the ground. In the toe
-/// pivot, the foot turns about its ball first and about the tip of its toes last.
+/// "Heel pivot" means that the foot turns about its heel, which stays on the ground. In steep steps
+/// down, the moving foot lands on its ball and turns about it instead. In the toe pivot, the foot
+/// turns about its ball first and about the tip of its toes last.
 class FootPaths {
  public:
   FootPaths(Foot moving, const StepTiming& timing);

@@ -4,8 +4,8 @@
 
 namespace stridewire::builtin {
 
-/// Frame rate of generated clips. Keytimes are rounded to whole frames, so the GaitStates at the
-/// start and the end of a step coincide with frames.
+/// Frame rate of generated steps and jumps. Keytimes are rounded to whole frames, so the GaitStates
+/// at the start and the end of a step coincide with frames.
 inline constexpr double kClipFps = 120.0;
 
 /// Rounds a time to whole frames.
@@ -17,8 +17,9 @@ inline constexpr double kClipFps = 120.0;
 /// 0.78 m in men who walked at their free speed.
 [[nodiscard]] double SteadyStepTime(double length_m);
 
-/// Returns the duration of a step in seconds. In the style kStairs, it increases with `rise_m`, the
-/// height difference of the feet, because people step more slowly on stairs and uneven ground.
+/// Returns the duration of a step in seconds. In the style kStairs, it is at least 0.72 s and
+/// increases with `rise_m`, the height difference of the feet, because people step more slowly on
+/// stairs and uneven ground.
 [[nodiscard]] double StepTime(double length_m, double rise_m, StepStyle style);
 
 /// Pitch of a foot while it rolls over its ball, as fractions of its pitch at toe-off. Rates are

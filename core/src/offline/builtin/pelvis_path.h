@@ -10,8 +10,8 @@
 namespace stridewire::builtin {
 
 /// The motion of the pelvis in a step. The gait states at both ends of the step determine its
-/// height there. Between the ends it is higher. Where a leg could not reach the ground with a
-/// slightly bent knee, the pelvis is lowered smoothly.
+/// height there. In a walk on level ground, it is higher between the ends. Where a leg could not
+/// reach the ground with a slightly bent knee, the pelvis is lowered smoothly.
 class PelvisPath {
  public:
   PelvisPath(Foot moving, const StepTiming& timing, const FootPaths& feet);

@@ -26,8 +26,9 @@ struct GlitchReport {
 
 /// Repairs capture glitches of a few frames in place. Frames before `first_frame` are ignored.
 ///
-/// - A joint jumps if it rotates by more than 1800 degrees/s between frames. If it returns within
-///   40 ms, the frames in between are interpolated by slerp.
+/// - A joint jumps if it rotates by more than 1800 degrees/s between frames. This limit is at least
+///   12 and at most 60 degrees per frame. If the joint returns within 40 ms, the frames in between
+///   are interpolated by slerp.
 /// - If a joint jumps within 40 ms of either end of the recording, the nearest good frame replaces
 ///   the frames beyond the jump.
 /// - A jump without return is spread over 80 ms if it is at most 45 degrees, or if the body extends

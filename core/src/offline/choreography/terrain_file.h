@@ -19,13 +19,13 @@ inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;
 ///                     "heights_m": [C * R numbers, row by row, x fastest]},
 ///    "boxes": [{"min_m": [x, z], "max_m": [x, z], "height_m": h}]}
 ///
-/// `height_field` and `boxes` are optional, but all keys inside them are required. Unknown keys are
-/// errors.
+/// `height_field` and `boxes` are optional, but all keys inside them are required. Unknown and
+/// duplicate keys are errors.
 ///
-/// Errors: kNotFound or kIo, with the file in Error::where. kMalformed, with "file:line:column", if
-/// the text is not JSON. For invalid values, kMalformed or the errors of Terrain::Make, with the
-/// field in Error::where, for example "t.json: boxes[3].max_m". kLimitExceeded if the file exceeds
-/// kMaxTerrainFileBytes.
+/// Errors: kNotFound or kIo, with the file in Error::where. The errors of ParseJson, with
+/// "file:line:column", if the text is not JSON or nested too deeply. For invalid values, kMalformed
+/// or the errors of Terrain::Make, with the field in Error::where, for example "t.json:
+/// boxes[3].max_m". kLimitExceeded if the file exceeds kMaxTerrainFileBytes.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ReadTerrain(
     const std::filesystem::path& path);
 

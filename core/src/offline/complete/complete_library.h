@@ -28,7 +28,9 @@ struct Completion {
 /// Completes a library with steps that its captures lack: starts, stops, small steps, turns on the
 /// spot and while walking, steps sideways and steps backward. Generated steps have the proportions,
 /// the posture and the cadence of the captured person. They begin and end in the poses of captured
-/// strides or in the stand pose. The function adds neither climbing steps nor jumps.
+/// strides or in the stand pose. If one step of a kind is lacking, for example a turn to the left,
+/// all basic steps of this kind are generated for both feet. The function adds neither climbing
+/// steps nor jumps.
 ///
 /// Generated steps form separate groups (RawGroup::is_completed) after the captured groups, which
 /// do not change. The sources of their examples begin with kCompletedSource. If the captures

@@ -30,7 +30,7 @@ struct StandParts {
 
 /// Measures the parts of a stand in all captured steps, for libraries without level, straight
 /// strides. The trunk leans no further than in a walk, because the steps may be of another kind.
-/// Returns nullopt if the sole of either foot is never flat on the ground.
+/// Returns nullopt if there are no captured steps.
 [[nodiscard]] std::optional<StandParts> MeasureStandParts(const RawLibrary& library);
 
 /// Composes a stand pose, with the feet side by side and the knees nearly straight.

@@ -19,7 +19,7 @@
 namespace stridewire::complete {
 namespace {
 
-// Keytimes are multiples of 1 / kFps.
+// Keytimes of steps forward are multiples of 1 / kFps.
 constexpr double kFps = 120.0;
 // The reach of the legs is checked about this many times per second.
 constexpr double kReachFps = 60.0;

@@ -17,8 +17,8 @@ inline constexpr int kPointsPerInterval = 16;
 inline constexpr int kIntervals = 3;
 inline constexpr int kPointCount = kIntervals * kPointsPerInterval + 1;
 
-/// Mean of all level, straight strides of one foot in the captures, as a function of generic time.
-/// The horizontal origin is the ball of the fixed foot.
+/// Mean of the level, straight strides of one foot in the captures, as a function of generic time.
+/// See MeasureStride. The horizontal origin is the ball of the fixed foot.
 struct StrideModel {
   std::vector<PostureSample> points;  ///< [point]
   std::array<double, kIntervals + 1> keytimes_s{};
@@ -60,9 +60,10 @@ void MeasureLegs(const Skeleton& skeleton, const LegRig& rig, std::array<StrideM
 /// Returns the time of a point of a stride with these keytimes.
 [[nodiscard]] double TimeAtPoint(std::span<const double> keytimes_s, std::size_t point);
 
-/// Returns the mean stride of a foot. Returns nullopt if the library contains no level, straight
-/// stride of that foot. If it contains strides of the other foot only, their mirror images are
-/// used, provided that the skeleton can be mirrored.
+/// Returns the mean of the level, straight strides of a foot in the first captured group that
+/// contains any. Omits steps over obstacles and strides of unusual length. If there are strides of
+/// the other foot only, uses their mirror images, provided that the skeleton can be mirrored.
+/// Returns nullopt if there are no strides.
 [[nodiscard]] std::optional<StrideModel> MeasureStride(const RawLibrary& library, Foot moving);
 
 }  // namespace stridewire::complete

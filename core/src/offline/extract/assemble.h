@@ -36,7 +36,8 @@ struct AssembleOptions {
 /// Besides start_z, end_z, length and the heights, a group has at most one parameter per three
 /// examples. Heights that vary are always parameters. If there are too few examples for that, the
 /// general group is omitted, and only jumps to one height are kept. Otherwise, blends of climbing
-/// and level examples would sink into level ground.
+/// and level examples would sink into level ground. A group without the turn parameter contains no
+/// steps with sharp turns, unless all its steps have them.
 ///
 /// A group without examples of its own is omitted. Straight or level groups with fewer than three
 /// steps cannot span an area of parameters. They are omitted if another group contains their steps.
@@ -60,7 +61,8 @@ class LibraryAssembler {
   [[nodiscard]] std::span<const Extraction> files() const { return files_; }
 
   /// Fails with kNotFound if no capture contains a usable movement of the requested kinds, or if
-  /// there are only climbing steps, but too few for a group.
+  /// there are only climbing steps, but too few for a group. Fails with kUnsupported if
+  /// `AssembleOptions::mirror` is set but left joints cannot be paired with right ones.
   [[nodiscard]] Expected<RawLibrary> Assemble() const;
 
  private:

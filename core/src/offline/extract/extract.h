@@ -70,7 +70,8 @@ struct Extraction {
   int steps_right = 0;
   int jumps = 0;
   std::vector<RejectedTime> rejected;
-  /// Notes of the BVH reader, and notes about repaired joint flips and excluded frames.
+  /// Notes of the BVH reader, and notes of the extraction, for example on repaired joint flips,
+  /// smoothed joints and excluded frames.
   std::vector<std::string> notes;
   /// If the capture contains no step and no jump: the reason, and what the user can do about it.
   /// Empty if `rejected` already contains the reasons.

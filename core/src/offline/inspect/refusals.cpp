@@ -13,8 +13,7 @@
 namespace stridewire {
 namespace {
 
-// If the result is within this distance of the request, the request is met, whatever the direction
-// of the error.
+// Directions of travel are compared only if the result is farther from the request than this.
 constexpr double kMetM = 0.05;
 
 double Horizontal(const DVec3& v) { return std::hypot(v.x, v.z); }

@@ -36,7 +36,8 @@ struct Refusal {
 /// - Jumps: motion of the base frame, in the heading at its start; change of heading.
 /// - Stands: relative position of the feet, compared with the stand pose.
 ///
-/// Heights are compared on level ground only, because a terrain determines them otherwise.
+/// Heights are compared only without a terrain, which would determine them, and not for steps with
+/// `at`.
 [[nodiscard]] std::vector<Refusal> FindRefusals(const SynthesisInput& input,
                                                 const Synthesis& synthesis);
 

@@ -14,7 +14,7 @@ namespace stridewire {
 enum class CheckVerdict : std::uint8_t {
   kPassed,
   kFailed,
-  kNotApplicable,  ///< The library has no such movement. `text` states which one.
+  kNotApplicable,  ///< The library has no such movement, or nothing was measured. See `text`.
 };
 
 /// Returns "passed", "failed" or "not_applicable".
@@ -29,7 +29,7 @@ struct CheckResult {
   double bound = 0.0;              ///< The check fails if `measured` is larger.
   std::string unit;                ///< Unit of `measured` and `bound`: "m" or "degrees".
   std::string text;    ///< Sentence that states what was measured, or why nothing was measured.
-  std::string advice;  ///< Advice for the user. Empty if the check did not fail.
+  std::string advice;  ///< Advice for the user if the check failed or a stop is missing, or empty.
 };
 
 /// The results of all checks, always in the same order.
