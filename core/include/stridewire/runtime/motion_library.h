@@ -121,7 +121,7 @@ inline constexpr double kEaseOutS = 0.2;
 
 /// Examples that can be blended with each other. They have the same kind, parameters, number of
 /// keytimes and grid. Keytimes are the times of corresponding events, such as toe-off and landing.
-/// All spans point into the bytes of the library.
+/// All spans point into memory of the library.
 ///
 /// Sites are the points in parameter space where weights are prescribed: first the examples, then
 /// the pseudoexamples. n is the number of examples, m the number of sites and d the number of

@@ -66,8 +66,8 @@ struct CardinalBasisFit {
   ///
   /// Errors: kShapeMismatch if the sizes of the spans do not match. kOutOfRange if a number is not
   /// finite, or if a scale or radius factor is not positive. kIllConditioned if two sites are
-  /// closer than kMinSiteDistance (index: the site), or if the condition number of R is above
-  /// kMaxCondition.
+  /// closer than kMinSiteDistance (index: the site), if the condition number of R is above
+  /// kMaxCondition, or if a coefficient is not finite.
   [[nodiscard]] Expected<CardinalBasis> Run() const;
 };
 

@@ -16,9 +16,9 @@ class MotionLibrary;
 /// joint. A positive rotation about it moves the shank backward.
 ///
 /// The axis is the mean normal of the leg's plane over all examples, weighted by how far the knee
-/// is bent. Knees bend in one direction only, so the normals also give the sign. If the knees
-/// hardly bend in any example, the axis points to the left of the foot in the stand pose. The
-/// result does not depend on the orientation of the joints' own frames.
+/// is bent. Knees bend in one direction only, so the normals also give the sign. If a knee hardly
+/// bends on average over the examples, its axis points to the left of the foot in the stand pose.
+/// The result does not depend on the orientation of the joints' own frames.
 ///
 /// Requires a library whose groups and stand pose are loaded. Returns zero vectors for a leg that
 /// is not a chain of hip, knee and ankle.
