@@ -17,7 +17,7 @@ inline constexpr std::size_t kJointRows = 4;
 struct CompactPlan {
   std::span<const CompactJoint> joints;
   std::span<const std::uint16_t> order;  // Indices of all joints, each after its parent.
-  std::span<const CompactPart> parts;    // Parts of all words; there are 4 n words.
+  std::span<const CompactPart> parts;    // Parts of all words, whose number is a multiple of 4.
 };
 
 /// A block of CompactCodec::kBlock poses. The arrays are those of CompactCodec::Block.

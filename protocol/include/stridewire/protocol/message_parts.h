@@ -9,7 +9,8 @@ using WorldId = std::uint32_t;   ///< Assigned by the server, never 0.
 using AvatarId = std::uint32_t;  ///< Id of an avatar, unique within its world and never 0.
 /// Chosen by the client; unique within its session, never 0.
 using SubscriptionId = std::uint32_t;
-using RequestId = std::uint64_t;  ///< Chosen by the client. 0: a step that the server inserted.
+/// Chosen by the client. 0: no request, for example for a step that the server inserted.
+using RequestId = std::uint64_t;
 
 /// Sequence number of a command in its session: 1, 2, 3, ... (STATE_MACHINE.md, "Commands").
 using Seq = std::uint64_t;

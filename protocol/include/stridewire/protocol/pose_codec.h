@@ -15,7 +15,7 @@ enum class PoseMode : std::uint8_t {
   /// Root position as 3 x int32 in fixed point; 48 bits per rotation ("smallest three").
   kQuantised = 1,
   kMovement = 2,  ///< Movement records instead of poses (Movements).
-  /// The joints have as many bits as the library requires (compact_codec.h). The server sends this
+  /// The number of bits per joint depends on the library (compact_codec.h). The server sends this
   /// mode, kCompactReduced and kCompactRoot to subscriptions of kQuantised. A client cannot request
   /// these three modes.
   kCompact = 3,
@@ -50,7 +50,7 @@ enum class PoseDetail : std::uint8_t {
 }
 
 /// Steps per metre of a quantised root position. A step is 2^-14 m (0.061 mm), so a coordinate
-/// changes by at most 2^-15 m (0.031 mm). From 1,024 m on, every float32 is a whole step.
+/// changes by at most 2^-15 m (0.031 mm). From 512 m on, every float32 is a whole step.
 inline constexpr float kRootStepsPerM = 16384.0f;
 /// Largest coordinate of a quantised root position in metres.
 inline constexpr float kMaxRootM = 131'071.0f;

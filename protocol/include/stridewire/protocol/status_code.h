@@ -15,8 +15,8 @@ enum class StatusCode : std::uint16_t {
   kUnsupported = 102,
   kVersionMismatch = 103,
   kUnauthorised = 104,  ///< The auth token is missing or does not grant enough rights.
-  /// An observer commanded avatars, or a subscription with a region is not the only one of its
-  /// world.
+  /// An observer sent a command for avatars, or the session would have a subscription with a region
+  /// and another subscription to the same world.
   kNotAllowed = 105,
   kNotJoined = 106,
   kNoSuchWorld = 107,
