@@ -34,8 +34,9 @@ class ServerThread {
 ///   then:    each shard passes complete batches to its sessions, or composes smaller batches for
 ///            sessions that observe selected avatars or a region
 ///
-/// Sockets only put commands into inboxes. Shards exchange values with Post and share nothing
-/// except the counters and the terrain of World, and AvatarBudget.
+/// A received command only enters the inboxes of the shards that execute it. Shards exchange values
+/// with Post. They share immutable data, and only the following mutable data: the counters and the
+/// terrain of World, and AvatarBudget.
 class Shard : public SessionHost {
  public:
   /// Borrows all references.

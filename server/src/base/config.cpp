@@ -223,7 +223,9 @@ std::vector<ConfigKey> MakeKeys() {
            &Config::allow_insecure),
       Flag("open_worlds", "Create a world when a client joins a name that the file does not list",
            &Config::open_worlds),
-      Flag("persistent", "Keep the avatars of a session that has ended", &Config::persistent),
+      Flag("persistent",
+           "Keep the avatars of a session that has ended, in worlds that the file does not list",
+           &Config::persistent),
       Text("log_level", "trace, debug, info, warning, error or off", &Config::log_level,
            CheckLogLevel),
       Number("drain_timeout_s", "Seconds for clients to receive pending messages after SIGTERM",
@@ -281,7 +283,7 @@ std::vector<ConfigKey> MakeKeys() {
         &Limits::observer_backlog_ticks, 1, 1000);
   limit("reply_cache_bytes", "Stored replies per session, in bytes", &Limits::reply_cache_bytes,
         std::size_t{4096}, 1024 * kMiB);
-  limit("event_replay_bytes", "Stored events per disconnected session, in bytes",
+  limit("event_replay_bytes", "Stored events per session, for a reconnect, in bytes",
         &Limits::event_replay_bytes, std::size_t{0}, 1024 * kMiB);
   limit("socket_send_buffer_bytes", "SO_SNDBUF of a connection; 0: the default of the system",
         &Limits::socket_send_buffer_bytes, std::size_t{0}, 64 * kMiB);

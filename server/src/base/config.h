@@ -59,7 +59,7 @@ struct Config {
   bool idle_motion = true;       ///< True: standing avatars breathe, sway and shift their weight.
   bool stride_variation = true;  ///< True: equal steps vary slightly, like the steps of people.
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
-  bool allow_insecure = false;   ///< True: the server may listen on addresses of a network.
+  bool allow_insecure = false;   ///< True: the server may listen on non-loopback addresses.
   /// True: when a client joins a world that the file does not name, the server creates it.
   bool open_worlds = true;
   bool persistent = false;  ///< WorldConfig::persistent for worlds that the file does not name.

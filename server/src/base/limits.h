@@ -55,7 +55,8 @@ struct Limits {
   std::size_t control_buffer_bytes = std::size_t{4} << 20;
   int observer_backlog_ticks = 4;  ///< Pose batches that may wait per world, mode and shard.
   std::size_t reply_cache_bytes = std::size_t{4} << 20;
-  /// Size of the events that are stored while a session has no connection.
+  /// Maximum total size of the last Events messages, which are stored so that they can be sent
+  /// again after a reconnect.
   std::size_t event_replay_bytes = std::size_t{1} << 20;
   /// Value of SO_SNDBUF; 0: the default of the system.
   std::size_t socket_send_buffer_bytes = 0;

@@ -10,7 +10,7 @@
 
 namespace stridewire::server {
 
-/// The proxies whose X-Forwarded-For header the server believes.
+/// The proxies whose X-Forwarded-For header the server trusts.
 ///
 ///   client 203.0.113.7 --> proxy 10.0.0.2 --> server
 ///   X-Forwarded-For: 203.0.113.7

@@ -26,7 +26,7 @@ class ConnectionHandler {
   virtual void OnBadFrame(const Error& error) = 0;
   /// Called when frames were sent, so that the send queue has room again.
   virtual void OnSent() {}
-  /// Called when no bytes were received for idle_timeout_s.
+  /// Called when no bytes were received for idle_timeout_s, unless reading is paused.
   virtual void OnIdle() {}
   /// Called when a pending write has made no progress for write_timeout_s.
   virtual void OnStuck() {}

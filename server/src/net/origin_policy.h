@@ -7,9 +7,9 @@
 
 namespace stridewire::server {
 
-/// Decides which web pages may open a stream. Browsers let any page connect to any server, but
-/// they send the origin of the page (header Origin, RFC 6454). A server that accepted every origin
-/// would let every page that its user visits control its avatars.
+/// Decides which web pages may open a stream. Browsers let any page connect to any server, but they
+/// send the origin of the page (header Origin, RFC 6454). If a server accepted every origin, any
+/// web page that its user visits could command its avatars.
 ///
 /// Three kinds of requests are allowed: requests without Origin, because they do not come from a
 /// browser; requests of the server's own pages, whose Origin has the host and port of the header

@@ -69,7 +69,8 @@ class SendQueue {
   /// The frames of one write, in the order in which they are sent.
   struct Gathered {
     std::vector<SharedFrame> frames;
-    std::size_t stream_frames = 0;  ///< The last frames, which contain movements or poses.
+    /// Number of frames at the end of `frames` that contain movements or poses.
+    std::size_t stream_frames = 0;
     std::size_t bytes = 0;
     std::uint64_t poses = 0;
     std::uint64_t batches = 0;

@@ -104,8 +104,8 @@ class WebSocketTransport final : public Transport {
   void Close() override {
     stream_.next_layer().Close();
     // Closing the socket ends only operations that use it. If an invalid frame arrives while a
-    // close frame is being sent, the read and the close of Beast wait for each other without using
-    // the socket, and would never release their `user`.
+    // close frame is being sent, Beast's read and close operations wait for each other without
+    // using the socket. Unless they are cancelled, they never release their `user`.
     for (auto* stop : {&stop_reading_, &stop_pinging_, &stop_ending_}) {
       stop->emit(asio::cancellation_type::terminal);
     }

@@ -12,8 +12,8 @@ namespace stridewire::server {
 using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
 /// Sends binary, uncompressed WebSocket messages: one for all movements and poses of a write, and
-/// one for each other frame. The first Receive answers
-/// `request`, which must be a WebSocket upgrade; the peer must wait for the answer.
+/// one for each other frame. The first Receive answers `request`, which must be a WebSocket
+/// upgrade; the peer must wait for the answer.
 ///
 /// The transport answers pings and accepts fragmented messages. It delivers a message in pieces as
 /// they arrive, so that an announced length does not allocate memory.

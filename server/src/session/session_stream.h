@@ -119,7 +119,7 @@ class SessionStream {
   /// Returns how long batches of a tick may wait for those of other shards. 0: they do not wait.
   [[nodiscard]] double GatherTime() const;
   /// Must be called after a batch that may wait was passed to the connection. Sends all batches of
-  /// the tick when those of all shards are there.
+  /// the tick as soon as those of all shards have arrived.
   void OnGathered(std::uint64_t tick, int shard);
   void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
   /// Numbers and sends a message. While the client is not connected, stores it instead. Returns how

@@ -199,7 +199,7 @@ class EncodedPoseCache {
     std::uint8_t first_plane = 0;
     Kind kind = kEmpty;
     std::uint8_t has_overflow : 1 = 0;  // see Overflow
-    // Exponent of the backoff: at most kMaxTicksAhead >> backoff poses are evaluated.
+    // Exponent of the backoff: at most ring_size_ >> backoff poses are evaluated.
     std::uint8_t backoff : 2 = 0;
   };
   static_assert(sizeof(SlotState) == 16);

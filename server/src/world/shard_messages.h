@@ -67,7 +67,8 @@ struct PlantingPart {
   std::vector<AvatarRef> avatars;
   bool enabled = true;
 };
-/// Removes the avatars that a session spawned, because it has ended or has left the world.
+/// Removes the avatars that a session spawned, because it has ended or has left the world. Has no
+/// effect in persistent worlds.
 struct ReleasePart {};
 
 /// Sets the terrain of all avatars. All shards apply it at the same tick.

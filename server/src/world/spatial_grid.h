@@ -6,9 +6,9 @@
 
 namespace stridewire::server {
 
-/// Positions of the avatars of one tick on the ground, sorted into the cells of a grid. Finds the
-/// avatars near a point without visiting all of them. One thread fills it. Any thread may then read
-/// it.
+/// Horizontal positions of all avatars in one tick, sorted into the cells of a grid. Finds the
+/// avatars near a point without visiting all of them. One thread fills the grid. Any thread may
+/// then read it.
 class SpatialGrid {
  public:
   /// Clears the grid. `cell_m` must be positive; `count` is the expected number of avatars.
