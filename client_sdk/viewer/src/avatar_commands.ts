@@ -22,7 +22,7 @@ export interface CommandHost {
   notify(text: string): void;
   /** Called after the queues of these avatars have been cleared. */
   onCancelled(pane: WorldPane, avatars: readonly number[]): void;
-  /** Updates the panel for a world with none of the sample terrains. */
+  /** Clears the panel's choice of terrain, because the world may have none of the samples. */
   resetTerrainChoice(): void;
 }
 

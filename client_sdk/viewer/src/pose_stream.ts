@@ -4,7 +4,7 @@ import type {PoseDetail, PoseMode, Statistics} from './sdk.js';
 
 export const tickIntervals = [1, 2, 4] as const;
 
-/** Stream modes: what the server sends, for the View panel. */
+/** Labels and descriptions of the stream modes, for the View panel. */
 export const streamModes: {readonly [mode in PoseMode]: {label: string; description: string}} = {
   movement: {
     label: 'Movement',

@@ -1,4 +1,4 @@
-// Controls Chromium by the DevTools protocol, for measurements. Playwright would distort them: it
+// Controls Chromium over the DevTools protocol, for measurements. Playwright would distort them: it
 // receives a copy of every WebSocket message, which for a thousand avatars costs as much as
 // drawing.
 

@@ -115,9 +115,13 @@ export class Client {
   /**
    * Returns the server time at which to sample poses: `serverTimeS()` minus a delay, which adapts
    * to the connection unless `renderDelayS` is set. It runs at most 5 % faster or slower than the
-   * server. It jumps only in a new session, if the server's clock changes by more than 0.25 s, if
-   * all poses of a second were over 0.25 s too late, and if the delay was over 0.5 s longer than
-   * necessary for a second. A jump starts a new segment of poses.
+   * server. It jumps only
+   * - in a new session,
+   * - if the server's clock has changed by more than 0.25 s,
+   * - if all poses of the last second arrived more than 0.25 s too late, or
+   * - if the delay has been more than 0.5 s longer than necessary for one second.
+   *
+   * A jump starts a new segment of poses.
    */
   renderTimeS(): number | null {
     return known(native().call.render_time(this.session.client, this.nowS()));

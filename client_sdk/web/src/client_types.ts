@@ -89,7 +89,7 @@ export interface ClientOptions {
   /**
    * Cache for the motion libraries of movement mode. `null`: no cache. Default: IndexedDB, shared
    * by all clients of the page's origin, or no cache where IndexedDB is missing. It keeps at most
-   * 16 libraries of 64 MiB in total and removes those that were not used for the longest time.
+   * 16 libraries with at most 64 MiB in total, and removes the least recently used ones.
    */
   libraryCache?: LibraryCache | null;
   /** Time limit for opening the WebSocket, and again for the handshake, 0.1 to 600. Default 5. */

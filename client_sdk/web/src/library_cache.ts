@@ -29,8 +29,8 @@ class IndexedDbCache implements LibraryCache {
   }
 
   /**
-   * Stores a library. If the cache then exceeds its limits, removes the libraries that were not
-   * used for the longest time. Does not store files of more than 64 MiB.
+   * Stores a library. If the cache then exceeds its limits, removes the least recently used
+   * libraries. Does not store files of more than 64 MiB.
    */
   async store(hash: string, file: Uint8Array): Promise<void> {
     if (file.length > maxBytes) return;

@@ -77,7 +77,8 @@ export class Session {
 
   // ---- Methods that the application calls.
 
-  /** Starts to connect. Does nothing if already open. `addressIndex` is an index in `urls`. */
+  /** Starts to connect. Does nothing if already open. `addressIndex` of `network` is an index in
+   * `urls`. */
   open(nowS: number, urls: readonly string[] = ['']): void {
     if (['waiting', 'connecting', 'handshake', 'ready'].includes(this.state)) return;
     this.lastError = '';

@@ -90,8 +90,8 @@ export type SpawnItem = Optional<messages.SpawnItem, 'avatar' | 'teleport'>;
 
 /**
  * Starts, changes or ends a layer: a clip of the motion library that is blended over an avatar's
- * movements, for example waving. Layers do not change the legs and the root. By default, `enabled`
- * is true, `weight` and `speed` are 1, and `blendS` is 0.3.
+ * movements, for example waving. Layers change neither the legs nor the root. By default,
+ * `enabled` is true, `weight` and `speed` are 1, and `blendS` is 0.3.
  */
 export type LayerRequest =
     Optional<messages.LayerItem, 'enabled' | 'weight' | 'blendS' | 'speed'>;
@@ -315,7 +315,8 @@ export interface World {
 
   spawn(items: readonly SpawnItem[]): Promise<Reply>;
   remove(avatars: readonly number[]): Promise<Reply>;
-  /** Clears the queues of these avatars. Current movements continue. */
+  /** Drops the requests of these avatars that have not started. Walks in progress end after their
+   * current step. */
   cancel(avatars: readonly number[]): Promise<Reply>;
   /** Queues movements. The list may contain several requests per avatar. */
   request(items: readonly MovementRequest[]): Promise<Reply>;
@@ -325,7 +326,8 @@ export interface World {
   /** Starts, changes or ends layers, at most four per avatar. */
   setLayers(items: readonly LayerRequest[]): Promise<Reply>;
   /** Enables or disables foot planting from the next movement on. Planted feet do not slide;
-   * otherwise feet move as in the examples. Initially enabled. */
+   * otherwise feet move as in the examples. Initially enabled, unless the server is configured
+   * otherwise. */
   setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply>;
   /** Starts to receive poses, and events if requested. At most 256 subscriptions per world. */
   observe(observation: Observation): Subscription;

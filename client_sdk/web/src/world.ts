@@ -28,11 +28,11 @@ export class WorldHandle implements World {
   readonly listeners = new Listeners<WorldListeners>();
   /** The world's number in the WebAssembly module; 0 if the module has refused it. */
   handle = 0;
-  /** Totals from the last report of the server. */
+  /** Number of events that the server has dropped since the join, from its last report. */
   reportedDroppedEvents = 0;
   /** Revision of the avatars in the last notification to listeners. */
   revision = 0;
-  /** The message of the skeleton as JSON, to detect changes. */
+  /** The skeleton in the last WorldInfo as JSON, to detect changes. */
   private skeletonText = '';
   private list = new Uint32Array(0);
   private listRevision = 0;

@@ -46,7 +46,7 @@ test('resends unanswered commands unchanged after a resume', async () => {
   assert.deepEqual(summary(again), ['Request 3', 'Request 5', 'Remove 6']);
   assert.deepEqual(again[0], first[0]);
   assert.deepEqual(again[1], first[2]);
-  // The server carried out command 3 before, so it replies twice. The caller sees one reply.
+  // The server had already executed command 3, so it replies twice. The caller sees one reply.
   h.receive(server.reply(3n), server.reply(3n), server.reply(5n, 400, [], 'full'));
   assert.deepEqual((await Promise.all(replies)).map(statusOf), ['ok', 'ok', 'limit_reached']);
   assert.equal(await settled(late), 'pending');

@@ -62,6 +62,7 @@ std::string text;
 // Memory for arguments. Its elements have 8 bytes, because frames must be aligned to 8 bytes.
 std::vector<std::uint64_t> input_words;
 
+/// Stores a text and its address in `results`, from which JavaScript reads it.
 void SetText(std::string_view value) {
   text = value;
   results[kTextAt] = static_cast<double>(reinterpret_cast<std::uintptr_t>(text.data()));
@@ -77,7 +78,7 @@ std::span<const std::byte> Input(std::size_t bytes) {
   return std::as_bytes(std::span(input_words)).first(bytes);
 }
 
-/// Decodes a frame. On error, sets the text.
+/// Decodes a frame. On error, passes a description to SetText and returns nullopt.
 std::optional<protocol::Message> Decode(const Expected<protocol::FrameView>& frame) {
   auto message = frame ? protocol::DecodeMessage(*frame) : std::unexpected(frame.error());
   if (message) return *std::move(message);
@@ -85,7 +86,8 @@ std::optional<protocol::Message> Decode(const Expected<protocol::FrameView>& fra
   return std::nullopt;
 }
 
-/// Decodes a message whose payload is in `input`. On error, sets the text.
+/// Decodes a message whose payload is in `input`. On error, passes a description to SetText and
+/// returns nullopt.
 std::optional<protocol::Message> DecodeInput(std::uint32_t type, std::size_t bytes) {
   return Decode(protocol::FrameView{static_cast<protocol::MessageType>(type), Input(bytes)});
 }
@@ -116,7 +118,7 @@ void RunLibraryTasks(Client& client) {
   }
 }
 
-/// Stores the number of a command, and its text if it was refused.
+/// Stores the number of a command in `results`. If the command was refused, also sets the text.
 std::uint32_t Report(Client& client, stridewire_status status, std::uint64_t command) {
   results[0] = static_cast<double>(command);
   if (status != STRIDEWIRE_OK) SetText(client.session.last_text());
@@ -562,7 +564,8 @@ std::size_t SampleAll(Client* client, stridewire_world world, double time_s, boo
 }  // namespace stridewire::client
 
 /// Replaces the function from which the allocator of the C library gets memory. Engines may copy
-/// the whole memory when it grows, so it grows by a quarter instead of 64 KiB at a time.
+/// the whole memory when it grows, so it grows by a quarter of its size (4 to 64 MiB) instead of 64
+/// KiB at a time.
 // NOLINTNEXTLINE(readability-identifier-naming): the name of the C library.
 extern "C" void* sbrk(std::intptr_t increment) {
   constexpr std::size_t kPageBytes = std::size_t{64} << 10;

@@ -207,7 +207,7 @@ export class CommandPanel {
     this.actions.walkTo(
       point.x, point.z, Number.isFinite(headingDeg) ? headingDeg * Math.PI / 180 : null);
   }
-  /** Updates the selection for a world with none of the sample terrains. */
+  /** Clears the choice of terrain, because the world may have none of the sample terrains. */
   resetTerrainChoice(): void {
     this.terrainSelect.value = '';
   }

@@ -179,8 +179,8 @@ function addEllipsoid(
 }
 
 /**
- * Skin weights of the trunk at height `y`. At a joint, it and the joint below share the weight;
- * halfway between two joints, only the lower one moves the trunk.
+ * Skin weights of the trunk at height `y`. At the height of a joint, this joint and the one below
+ * it have half of the weight each. Halfway between two joints, the lower one has the whole weight.
  */
 function trunkWeights(trunk: readonly Anchor[], y: number): SkinWeights {
   let i = 0;

@@ -1,5 +1,5 @@
-// Buffers for a crowd whose points the CPU transforms, so that the shader only projects them. The
-// whole crowd is one draw call, which suits software renderers.
+// Buffers for a crowd whose vertices are transformed on the CPU, so that the shader only projects
+// them. The whole crowd is one draw call, which suits software renderers.
 
 import * as THREE from 'three';
 

@@ -20,8 +20,8 @@ const maxSpeedMS = 3;
 
 // Samples all walkers once per frame. Keeps the samples of the last 5 s. Counts jumps: successive
 // samples of the same segment that are farther apart than the highest speed allows. The client
-// keeps poses of about half a second, so samples that are 0.6 s or more apart in one segment may
-// not be farther apart than 0.6 s allow.
+// stores poses of about half a second. Poses of one segment can therefore differ by the motion of
+// at most 0.6 s, even if more time has passed between the samples.
 const script = `
   import {Client, createPose} from '@stridewire/client';
   globalThis.start = (url, mode) => {

@@ -23,7 +23,8 @@ export interface RestartReport {
   samples: number;
   /** Changes of the segment of sampled poses. */
   segments: number;
-  /** Largest distance between successive samples of a segment, beyond that of the highest speed. */
+  /** Largest distance between successive samples of a segment, minus the distance that
+   * `maxSpeedMS` allows. */
   largestM: number;
 }
 
