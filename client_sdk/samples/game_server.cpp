@@ -40,7 +40,8 @@ struct Settings {
   std::array<double, 2> step_m = {0.35, 0.7};
   std::array<double, 2> jump_m = {0.4, 1.2};
   double turn_rad = 0.0;
-  // Distance from the start at which avatars turn back, in metres; 0: no limit
+  // Distance from the middle of the row of spawned avatars beyond which avatars turn back, in
+  // metres; 0: no limit
   double home_m = 0.0;
 };
 
@@ -135,8 +136,9 @@ class GameServer {
     spawned_ = static_cast<bool>(client_.Spawn(world_, spawns));
   }
 
-  // Returns the turn per step of a walk of `steps` steps: a random one, or one towards the start if
-  // the avatar is too far away.
+  // Returns the turn per step for a walk of `steps` steps. It is random, unless the avatar is more
+  // than home_m away from the middle of the row in which the avatars were spawned. It then leads
+  // back.
   double Turn(const stridewire_event& event, int steps) {
     const double x = 0.75 * (settings_.avatars - 1) - event.base_position_m[0];
     const double z = -event.base_position_m[2];

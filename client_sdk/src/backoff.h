@@ -16,7 +16,7 @@ class Backoff {
 
   explicit Backoff(std::uint64_t seed) : random_(seed) {}
 
-  /// Returns the delay before the next attempt in seconds.
+  /// Returns the delay in seconds before the next attempt.
   [[nodiscard]] double Next();
 
   /// Starts again with kFirstS, after a successful attempt.

@@ -11,8 +11,8 @@ namespace stridewire::client {
 /// the clocks plus the delay of the message. Delays are never negative, so the smallest offset of
 /// the last kWindowS is the best estimate. The map approaches it at a rate of at most kSlew, so
 /// that the mapped time neither jumps nor runs backwards. It jumps in two cases only. In the first,
-/// the estimate changes by more than kSnapS, which means that the server's clock has changed. In
-/// the second, a smaller offset arrives during the first kSettleS.
+/// the estimate differs from the map by more than kSnapS, which means that the server's clock has
+/// changed. In the second, a smaller offset arrives during the first kSettleS.
 class ClockMap {
  public:
   static constexpr int kBuckets = 8;

@@ -26,7 +26,8 @@ class PlayoutClock {
   /// Maximum number of offsets in the window. If there are more ticks per second, the window is
   /// shorter.
   static constexpr std::size_t kMaxOffsets = 256;
-  /// Fraction of a normal distribution that exceeds its mean by at most two standard deviations.
+  /// Fraction of the values of a normal distribution that are at most two standard deviations above
+  /// the mean.
   static constexpr double kQuantile = 0.977;
   /// Maximum difference between the speeds of the display and of the server, as a fraction.
   static constexpr double kMaxRate = 0.05;
@@ -34,7 +35,8 @@ class PlayoutClock {
   static constexpr double kDecayS = 0.25;
   /// Margin that is added to the delay, as a fraction of the interval between messages.
   static constexpr double kMargin = 0.25;
-  /// Delay after the first message, until the window is full.
+  /// Minimum delay relative to the first message, until kWindowS after that message. After this
+  /// time, the window determines the delay.
   static constexpr double kFirstDelayS = 0.1;
   /// Minimum pause between messages that counts as a stall. It must also exceed three intervals.
   static constexpr double kStallS = 0.4;
@@ -51,7 +53,7 @@ class PlayoutClock {
   /// jumped.
   bool AddSample(double local_s, double server_s, double interval_s);
 
-  /// Must be called after a lost connection, which counts as a stall.
+  /// Must be called when the connection is lost, which counts as a stall.
   void OnStall(double local_s);
 
   [[nodiscard]] bool ready() const { return ready_; }

@@ -88,7 +88,8 @@ class PoseHistory {
   [[nodiscard]] bool IsDisplayedAfterNewest() const {
     return size_ > 0 && displayed_s_ > stamp(size_ - 1).time_s;
   }
-  /// Returns true if Display evaluates a movement at a time between two poses.
+  /// Returns true if `time_s` is between two poses and Display evaluates their movement at this
+  /// time instead of interpolating the poses.
   [[nodiscard]] bool IsMovementAt(double time_s) const {
     return FindCurve(time_s).kind == Curve::Kind::kMovement;
   }

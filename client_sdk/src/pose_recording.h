@@ -67,7 +67,7 @@ class PoseRecording {
     std::vector<protocol::AvatarId> avatars;
     std::vector<std::uint8_t> flags;
     std::vector<std::byte> poses;
-    std::vector<protocol::AvatarId> moving;  ///< Avatars whose poses follow from `movements_`.
+    std::vector<protocol::AvatarId> moving;  ///< Avatars whose poses `movements_` evaluates.
   };
   struct Tick {
     protocol::PoseBatchInfo info;

@@ -20,8 +20,8 @@ class Session : public SessionCommands {
  public:
   /// Maximum time for sending Goodbye, in seconds.
   static constexpr double kGoodbyeS = 1.0;
-  /// After a connection that was ready for this time, in seconds, the first delay before
-  /// reconnecting is the shortest one.
+  /// If a connection was ready for at least this time, in seconds, the delays before attempts to
+  /// reconnect start again with the shortest one (Backoff::Reset).
   static constexpr double kStableS = 2.0;
 
   using SessionCommands::SessionCommands;

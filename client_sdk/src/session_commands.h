@@ -38,9 +38,9 @@ class SessionCommands : public SessionState {
 
   /// Queries the state of an avatar. The event REPLY with the command `nonce` reports the result.
   /// If it is OK, the application reads the AvatarState message. The result is CONNECTION_LOST if
-  /// the connection is lost, and TIMEOUT after kInspectTimeoutS. Fails with NOT_READY if the world
-  /// is not joined, and with COMMANDS_FULL if there are more than kMaxInspections unanswered
-  /// queries.
+  /// the connection is lost, and TIMEOUT after kInspectTimeoutS. Fails with NOT_READY if there is
+  /// no connection or the world is not joined, and with COMMANDS_FULL if kMaxInspections queries
+  /// are unanswered.
   stridewire_status Inspect(stridewire_world world, protocol::AvatarId avatar,
                             std::uint64_t& nonce);
   static constexpr double kInspectTimeoutS = 10.0;

@@ -427,7 +427,8 @@ void Session::Handle(const protocol::Events& message, double now_s) {
                           now_s);
   }
   if (message.number != 0) {
-    // Ignores a message that was received before the resume.
+    // After a resume, the server may send messages again. Those that have been received already are
+    // ignored.
     if (message.number <= last_events_number_) return;
     last_events_number_ = message.number;
   }

@@ -196,7 +196,7 @@ class SessionState {
   std::uint64_t connection_number_ = 0;
   std::vector<std::string> addresses_;
   std::size_t address_ = 0;          ///< Index of the current address.
-  std::size_t failed_attempts_ = 0;  ///< Attempts that have failed since the last back-off.
+  std::size_t failed_attempts_ = 0;  ///< Attempts that have failed since the last delay.
   double next_attempt_s_ = 0.0;
   double deadline_s_ = 0.0;  ///< Timeout of kConnecting, kGreeting and kClosing.
   double ready_s_ = 0.0;

@@ -149,7 +149,8 @@ class WorldView : public PoseSink {
   [[nodiscard]] double newest_time_s() const { return newest_time_s_; }
 
  private:
-  /// The last ticks of a shard that had evaluated poses. Ticks are numbered from 0 on.
+  /// The last ticks of a shard in which poses were evaluated, as a ring. Each tick has a number:
+  /// they are counted from 0 on.
   struct ShardTicks {
     struct Tick {
       std::uint64_t tick = 0;
@@ -164,8 +165,9 @@ class WorldView : public PoseSink {
       return count - std::min<std::uint64_t>(count, ring.size());
     }
 
-    // Scratch memory of SampleAll: the sampled time is `share` of the way from `sampled` to the
-    // next tick. If there is no such tick, `is_sampled` is false.
+    // Scratch memory of SampleAll: the sampled time is `share` of the way from tick number
+    // `sampled` to the next one. `is_sampled` is false if the time is before the oldest or after
+    // the newest tick.
     std::uint64_t sampled = 0;
     double share = 0.0;
     bool is_sampled = false;
@@ -173,7 +175,7 @@ class WorldView : public PoseSink {
   };
   /// A point of a movement.
   struct MovementPoint {
-    std::uint64_t tick = 0;  ///< Number of the tick in the ring of its shard.
+    std::uint64_t tick = 0;  ///< Number of the tick in ShardTicks.
     std::uint64_t step = 0;  ///< Movements::step of the tick.
     double time_s = 0.0;     ///< Time of the movement at the tick.
   };

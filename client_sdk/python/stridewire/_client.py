@@ -71,9 +71,10 @@ class Client:
             world = client.join("plaza")
 
     `address` is HOST:PORT, or a list of up to 16 servers that offer the same worlds. The client
-    tries them in order, and again when it has lost the connection.
+    tries them in order. After a lost connection, it starts with the same server.
 
-    `timeout_s` limits every call that waits for the server. A client is not thread-safe.
+    `timeout_s` limits every call that waits for the server, except `World.wait`, which has its own
+    limit. A client is not thread-safe.
     """
 
     #: Number of events that are kept for `poll_events`, and in each world for `wait`. If there are
@@ -147,7 +148,7 @@ class Client:
         return events
 
     def playout(self) -> Playout:
-        """Returns the delay of sampled poses, and how many poses arrived too late."""
+        """Returns the delays of the render time and the counts of sampled poses."""
         raw = _abi.stridewire_playout()
         _check(_library.stridewire_client_get_playout(self._handle, c.byref(raw)))
         return Playout(raw.delay_s, raw.target_delay_s, raw.jitter_s, raw.newest_age_s,
@@ -250,7 +251,8 @@ class World(Requests):
         return self.client._await_reply(command.value)
 
     def leave(self) -> None:
-        """Leaves the world, which removes the avatars that this client has spawned in it."""
+        """Leaves the world. The server removes the avatars that this client has spawned in it,
+        unless the world is persistent."""
         self._command(_library.stridewire_client_leave_world)
         self.client._watchers.remove(self._watch)
 
@@ -295,7 +297,8 @@ class World(Requests):
         return request_id
 
     def cancel(self, *avatars: int) -> None:
-        """Drops the requests of these avatars that have not started."""
+        """Drops the requests of these avatars that have not started. Walks in progress end after
+        their current step."""
         self._command(_library.stridewire_client_cancel, _ids(avatars), len(avatars))
 
     def wait(self, request_id: int, timeout_s: float = 60.0) -> Event:
@@ -332,7 +335,8 @@ class World(Requests):
 
     def observe(self, mode: PoseMode = PoseMode.QUANTISED, *, avatars: Iterable[int] = (),
                 every_n_ticks: int = 1, events: bool = False) -> int:
-        """Subscribes to poses of avatars, or of all. Returns the number of the subscription."""
+        """Subscribes to the poses of these avatars, or of all avatars if `avatars` is empty.
+        Returns the number of the subscription."""
         ids = _ids(avatars)
         observation = _abi.stridewire_observation(
             mode=mode, every_n_ticks=every_n_ticks, with_events=events,
@@ -391,7 +395,8 @@ class World(Requests):
         return self._fill(_library.stridewire_client_sample_pose, avatar, c.c_double(time_s))
 
     def record(self, avatar: int, seconds: float, until: int | None = None) -> Recording:
-        """Records the poses of an avatar for a time. With `until`, ends when that request ends."""
+        """Records the poses of an avatar for `seconds`, or until the request with the id `until`
+        has ended."""
         events: list[Event] = []
 
         def watch(event: Event) -> None:

@@ -174,15 +174,16 @@ class Skeleton:
 
 @dataclass(frozen=True)
 class Playout:
-    """How the display follows the connection. Times that are not known yet are 0."""
+    """Describes how the render time adapts to the connection. Times that are not known yet are
+    0."""
 
     delay_s: float  #: Delay of the render time behind the server time.
     target_delay_s: float  #: The delay that `delay_s` approaches.
     jitter_s: float  #: Mean lateness of pose messages relative to the fastest one.
     newest_age_s: float  #: Server time that has passed since the newest pose message.
     displayed_poses: int  #: Number of sampled poses.
-    extrapolated_poses: int  #: Sampled poses after the newest one, still in motion.
-    held_poses: int  #: Sampled poses after the newest one, after it had stopped.
+    extrapolated_poses: int  #: Poses extrapolated beyond the newest received one.
+    held_poses: int  #: Poses sampled after the extrapolation had stopped.
 
 
 @dataclass(frozen=True)

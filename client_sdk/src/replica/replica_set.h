@@ -55,8 +55,9 @@ class PoseSink {
 /// Evaluates the avatars of one world from movement records (protocol/STANDARD.md, "Movement
 /// records"). The poses are bit-identical to the server's poses of the same ticks.
 ///
-/// - If a message follows the previous one, the set applies its records and advances all avatars of
-///   the shard by one tick.
+/// - If a message of changes follows the previous message, the set applies its records. After the
+///   last part of a step, it advances all avatars of the shard by one tick.
+/// - A message of states contains the complete states of avatars that the client does not know yet.
 /// - If a message is missing, the set discards all avatars of the shard until the server sends
 ///   their states.
 ///

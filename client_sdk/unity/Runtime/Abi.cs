@@ -84,7 +84,8 @@ namespace Stridewire
     {
         /// <summary>The movement begins after all queued movements.</summary>
         Queued = 0,
-        /// <summary>The movement begins after the current movement. The queue is dropped.</summary>
+        /// <summary>The movement begins after the current step or jump. A current stand ends at
+        /// once, and a walk ends after its current step. The queue is dropped.</summary>
         AfterMovement = 1,
         /// <summary>The movement begins as soon as the feet allow it. The queue is
         /// dropped.</summary>
@@ -112,8 +113,8 @@ namespace Stridewire
     public enum PoseDetail
     {
         All = 0,
-        /// <summary>Omits hands, toes, head and other joints whose omission moves no point by more
-        /// than 0.12 m.</summary>
+        /// <summary>Omits joints whose omission moves no point of the figure by more than 0.12 m,
+        /// for example hands, toes and head.</summary>
         Reduced = 1,
         /// <summary>Position and rotation of the root only, 18 bytes per pose.</summary>
         Root = 2,
@@ -144,23 +145,25 @@ namespace Stridewire
         ConnectionLost = 2,
         /// <summary>The server no longer has the session of this client.</summary>
         SessionLost = 3,
-        /// <summary>Uses status, text. The client does not try again.</summary>
+        /// <summary>Uses status, text. The client does not try again. The status is OK if the
+        /// application has disconnected.</summary>
         Closed = 4,
         /// <summary>Uses world. The skeleton is available. Repeated after SESSION_LOST.</summary>
         WorldJoined = 5,
-        /// <summary>Uses command, status, accepted, text. The status is OK only if the server has
-        /// executed all items. Otherwise it is the status of the first refused item. `accepted` is
-        /// the number of executed items.</summary>
+        /// <summary>Uses world, command, status, accepted, text. The status is OK only if the
+        /// server has executed all items. Otherwise it is the status of the first refused item.
+        /// `accepted` is the number of executed items.</summary>
         Reply = 6,
-        /// <summary>Uses command, item_index, avatar, request_id, status, text. Reports an item
-        /// that the server refused, or the id that it chose for a spawned avatar. Precedes the
+        /// <summary>Uses world, command, item_index, avatar, request_id, status, text. Reports an
+        /// item that the server refused, or the id that it chose for a spawned avatar. Precedes the
         /// REPLY.</summary>
         Item = 7,
         /// <summary>Uses world, dropped_batches, dropped_events. This client reads too
         /// slowly.</summary>
         Lagging = 8,
         /// <summary>Uses status, text, and command and world if they are known. A message of the
-        /// server that does not end the connection.</summary>
+        /// server that does not end the connection, or the failure of a command with which the
+        /// client restores a lost session.</summary>
         Notice = 9,
         /// <summary>Uses rtt_s, tick, time_s.</summary>
         Pong = 10,

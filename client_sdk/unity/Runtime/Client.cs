@@ -149,7 +149,8 @@ namespace Stridewire
         }
 
         /// <summary>Starts to connect to one of up to 16 servers that offer the same worlds. The
-        /// client tries them in order. It does so again after it has lost the connection.</summary>
+        /// client tries them in order. After a lost connection, it starts with the same server.
+        /// </summary>
         public void Connect(params ServerAddress[] servers)
         {
             var hosts = new GCHandle[servers.Length];
@@ -219,7 +220,8 @@ namespace Stridewire
             return true;
         }
 
-        /// <summary>Waits for an event. Returns false after the time, 0 to 3600 s.</summary>
+        /// <summary>Waits for an event for at most timeoutS, 0 to 3600 s. Returns false if none has
+        /// arrived.</summary>
         public bool WaitEvent(double timeoutS)
         {
             if (nextPolled < polledCount) return true;
@@ -241,7 +243,7 @@ namespace Stridewire
             return true;
         }
 
-        /// <summary>How the display follows the connection.</summary>
+        /// <summary>Describes how the render time adapts to the connection.</summary>
         public Playout Playout
         {
             get

@@ -155,10 +155,11 @@ namespace Stridewire
         public double NewestAgeS;
         /// <summary>Number of sampled poses.</summary>
         public ulong DisplayedPoses;
-        /// <summary>Sampled poses after the newest received one, whose motion continued.</summary>
+        /// <summary>Number of poses that were sampled after the newest received pose and
+        /// extrapolated from it.</summary>
         public ulong ExtrapolatedPoses;
-        /// <summary>Sampled poses after the newest received one, whose motion had
-        /// stopped.</summary>
+        /// <summary>Number of poses that were sampled after the extrapolated motion had stopped.
+        /// </summary>
         public ulong HeldPoses;
     }
 

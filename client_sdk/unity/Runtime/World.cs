@@ -25,8 +25,8 @@ namespace Stridewire
         /// <summary>Number of the command that joins this world.</summary>
         public ulong JoinCommand { get; private set; }
 
-        /// <summary>Leaves the world, which removes the avatars that this client has spawned in it.
-        /// </summary>
+        /// <summary>Leaves the world. The server removes the avatars that this client has spawned
+        /// in it, unless the world is persistent.</summary>
         public ulong Leave()
         {
             ulong command;

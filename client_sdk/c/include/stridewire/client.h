@@ -81,8 +81,8 @@ typedef struct stridewire_client_options {
   uint32_t pose_history;
   /// Memory for unanswered commands in bytes, at least 64 KiB. Default 64 MiB.
   size_t max_command_bytes;
-  /// Memory for all pose histories in bytes, at least 64 KiB. Poses of avatars that do not fit are
-  /// dropped and counted in `poses_refused`. Default 256 MiB.
+  /// Memory for all pose histories in bytes, at least 64 KiB. If the history of an avatar does not
+  /// fit, its poses are dropped and counted in `poses_refused`. Default 256 MiB.
   size_t max_pose_bytes;
   /// Delay of the render time behind the server time in seconds, at most 10. If it is negative,
   /// which is the default, the client adapts the delay to the connection.
@@ -120,8 +120,8 @@ stridewire_status stridewire_client_create(const stridewire_client_options* opti
 void stridewire_client_destroy(stridewire_client* client);
 
 /// Starts to connect and returns at once. `host` is a name or an IP address of at most 255 bytes.
-/// Fails with INVALID_ARGUMENT, or with ALREADY_CONNECTED until stridewire_client_disconnect is
-/// called.
+/// `port` must not be 0. Fails with INVALID_ARGUMENT if an argument is invalid, and with
+/// ALREADY_CONNECTED if the client is connecting or connected.
 stridewire_status stridewire_client_connect(stridewire_client* client, const char* host,
                                             uint16_t port);
 
@@ -173,14 +173,15 @@ stridewire_status stridewire_client_last_error(stridewire_client* client, char* 
 // idle or closed), NO_SUCH_WORLD (unknown world number) and NOT_JOINED (the server refused the
 // join, or the client has left the world).
 
-/// Joins a world. `world` receives a number that further calls may use at once: the client delays
-/// their commands until the server has accepted the join. Fails with ALREADY_JOINED if this name is
+/// Joins a world. `world` receives a number that further calls may use at once: the client sends
+/// their commands when the server has accepted the join. Fails with ALREADY_JOINED if this name is
 /// joined, and with LIMIT_REACHED beyond 256 worlds.
 stridewire_status stridewire_client_join_world(stridewire_client* client, const char* name,
                                                stridewire_role role, stridewire_world* world,
                                                uint64_t* command);
 
-/// Leaves a world. Its number becomes invalid.
+/// Leaves a world. Its number becomes invalid. The server removes the avatars that this session
+/// spawned in the world, unless the world is persistent.
 stridewire_status stridewire_client_leave_world(stridewire_client* client, stridewire_world world,
                                                 uint64_t* command);
 
@@ -240,17 +241,18 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
 
 /// Observes a world. `subscription`, unless NULL, receives the number of the observation. If
 /// several observations include an avatar, the client stores the first pose it receives for each
-/// tick.
+/// tick. Fails with LIMIT_REACHED beyond 256 observations of one world.
 stridewire_status stridewire_client_observe(stridewire_client* client, stridewire_world world,
                                             const stridewire_observation* observation,
                                             uint32_t* subscription, uint64_t* command);
 
 /// Moves the region of an observation, for example when the player walks. Avatars inside both
-/// regions neither leave nor enter.
+/// regions neither leave nor enter. Fails with NO_SUCH_SUBSCRIPTION if no observation with a region
+/// has this number.
 stridewire_status stridewire_client_move_region(stridewire_client* client, uint32_t subscription,
                                                 const stridewire_region* region, uint64_t* command);
 
-/// Ends an observation.
+/// Ends an observation. Fails with NO_SUCH_SUBSCRIPTION if no observation has this number.
 stridewire_status stridewire_client_stop_observing(stridewire_client* client, uint32_t subscription,
                                                    uint64_t* command);
 
@@ -268,20 +270,23 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< Uses status, text. The client tries again.
   STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< Uses status, text. The client reconnects.
   STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server no longer has the session of this client.
-  STRIDEWIRE_EVENT_CLOSED = 4,           ///< Uses status, text. The client does not try again.
+  /// Uses status, text. The client does not try again. The status is OK if the application has
+  /// disconnected.
+  STRIDEWIRE_EVENT_CLOSED = 4,
   /// Uses world. The skeleton is available. Repeated after SESSION_LOST.
   STRIDEWIRE_EVENT_WORLD_JOINED = 5,
-  /// Uses command, status, accepted, text. The status is OK only if the server has executed all
-  /// items. Otherwise it is the status of the first refused item. `accepted` is the number of
+  /// Uses world, command, status, accepted, text. The status is OK only if the server has executed
+  /// all items. Otherwise it is the status of the first refused item. `accepted` is the number of
   /// executed items.
   STRIDEWIRE_EVENT_REPLY = 6,
-  /// Uses command, item_index, avatar, request_id, status, text. Reports an item that the server
-  /// refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
+  /// Uses world, command, item_index, avatar, request_id, status, text. Reports an item that the
+  /// server refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
   STRIDEWIRE_EVENT_ITEM = 7,
   /// Uses world, dropped_batches, dropped_events. This client reads too slowly.
   STRIDEWIRE_EVENT_LAGGING = 8,
   /// Uses status, text, and command and world if they are known. A message of the server that does
-  /// not end the connection.
+  /// not end the connection, or the failure of a command with which the client restores a lost
+  /// session.
   STRIDEWIRE_EVENT_NOTICE = 9,
   STRIDEWIRE_EVENT_PONG = 10,  ///< Uses rtt_s, tick, time_s.
   /// Uses world. Its terrain has changed; see stridewire_client_get_terrain.
@@ -360,8 +365,8 @@ typedef struct stridewire_event {
   int32_t group;         ///< Index of the motion group in the library, or -1.
   uint8_t resumed;       ///< 1: the session survived the reconnect.
   uint8_t extrapolated;  ///< 1: `applied` lies outside the range of the examples.
-  /// 1: `applied` differs from `requested`, which is out of reach. In ACCEPTED: the library cannot
-  /// walk at the requested speed.
+  /// 1: `applied` differs from `requested`, which is out of reach. In ACCEPTED: the library's steps
+  /// do not permit the requested walking speed.
   uint8_t clamped;
   uint8_t cut_short;  ///< 1: another request interrupted the movement.
   double position_m[3];
@@ -500,16 +505,19 @@ stridewire_status stridewire_client_server_time(stridewire_client* client, doubl
 
 /// Gets the time at which to sample poses: the server time minus a delay. The client chooses the
 /// smallest delay with which poses arrive in time, and changes it smoothly: render time runs at
-/// most 5 % faster or slower than the server. It jumps only in a new session, if the server's clock
-/// changes by more than 0.25 s, if all poses of a second were over 0.25 s too late, and if the
-/// delay was over 0.5 s longer than necessary for a second. A jump starts a new segment of poses.
+/// most 5 % faster or slower than the server. It jumps only
+///   - in a new session,
+///   - if the server's clock has changed by more than 0.25 s,
+///   - if all poses of the last second arrived more than 0.25 s too late, or
+///   - if the delay has been more than 0.5 s longer than necessary for one second.
+/// A jump starts a new segment of poses.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
 
 /// Describes how the render time adapts to the connection. Times that are not known yet are 0.
 typedef struct stridewire_playout {
   double delay_s;            ///< Delay of the render time behind the server time.
   double target_delay_s;     ///< The delay that `delay_s` approaches.
-  double interval_s;         ///< Longest interval of the observed poses, at most 0.25 s.
+  double interval_s;         ///< Longest interval between observed poses, at most 0.25 s.
   double jitter_s;           ///< Mean lateness of pose messages relative to the fastest one.
   double worst_jitter_s;     ///< Largest lateness of the last 4 s.
   double newest_age_s;       ///< Server time that has passed since the newest pose message.
@@ -565,7 +573,8 @@ typedef struct stridewire_pose {
 
 /// Samples the pose of an avatar at a server time. The result for an unknown avatar is
 /// STRIDEWIRE_POSE_MISSING, not an error. Returns BUFFER_TOO_SMALL if `joint_capacity` is too
-/// small; `joint_count` then has the required capacity.
+/// small; `joint_count` then has the required capacity. Returns OUT_OF_RANGE if `time_s` is not
+/// finite.
 stridewire_status stridewire_client_sample_pose(stridewire_client* client, stridewire_world world,
                                                 uint32_t avatar, double time_s,
                                                 stridewire_pose* pose);

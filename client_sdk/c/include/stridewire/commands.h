@@ -47,7 +47,8 @@ typedef enum stridewire_foot {
 /// queue.
 typedef enum stridewire_interrupt {
   STRIDEWIRE_QUEUED = 0,  ///< The movement begins after all queued movements.
-  /// The movement begins after the current movement. The queue is dropped.
+  /// The movement begins after the current step or jump. A current stand ends at once, and a walk
+  /// ends after its current step. The queue is dropped.
   STRIDEWIRE_AFTER_MOVEMENT = 1,
   /// The movement begins as soon as the feet allow it. The queue is dropped.
   STRIDEWIRE_NOW = 2,
@@ -83,8 +84,8 @@ typedef struct stridewire_movement {
   const double* waypoints_m;
   size_t waypoint_count;  ///< Walk: number of waypoints, at most STRIDEWIRE_MAX_WAYPOINTS.
   uint8_t has_speed;      ///< Walk: 1 uses `speed_m_s`, 0 leaves the speed to the server.
-  /// Walk with `has_speed`: speed, 0.05 to 5. The server comes as close as the library allows, see
-  /// `speed_m_s` of stridewire_event.
+  /// Walk with `has_speed`: speed in m/s, 0.05 to 5. The server comes as close to it as the library
+  /// allows, see `speed_m_s` of stridewire_event.
   double speed_m_s;
   stridewire_interrupt interrupt;
   /// Step: 1 rejects the step unless the foot lands exactly at its place. Not together with
@@ -123,7 +124,8 @@ typedef struct stridewire_terrain_def {
 } stridewire_terrain_def;
 
 /// Starts, changes or ends a layer: a clip of the library that plays over the current movement, for
-/// example waving or carrying. Layers do not change the legs. See stridewire_client_list_layers.
+/// example waving or carrying. Layers change neither the legs nor the root. See
+/// stridewire_client_list_layers.
 typedef struct stridewire_layer {
   uint32_t avatar;   ///< Id of the avatar, not 0.
   const char* name;  ///< Name of the layer, 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
@@ -137,8 +139,8 @@ typedef struct stridewire_layer {
 typedef struct stridewire_planting {
   const uint32_t* avatars;  ///< Ids of the avatars.
   size_t avatar_count;      ///< Number of avatars, 1 to STRIDEWIRE_MAX_ITEMS.
-  /// 1: feet stand still where they land (the state after a spawn). 0: feet move as in the
-  /// examples.
+  /// 1: feet stand still where they land. 0: feet move as in the examples. After a spawn the value
+  /// is 1, unless the server is configured otherwise.
   uint8_t enabled;
 } stridewire_planting;
 
@@ -161,13 +163,14 @@ typedef enum stridewire_pose_mode {
 /// rotations, which are typical rotations in the library.
 typedef enum stridewire_pose_detail {
   STRIDEWIRE_DETAIL_ALL = 0,
-  /// Omits hands, toes, head and other joints whose omission moves no point by more than 0.12 m.
+  /// Omits joints whose omission moves no point of the figure by more than 0.12 m, for example
+  /// hands, toes and head.
   STRIDEWIRE_DETAIL_REDUCED = 1,
   STRIDEWIRE_DETAIL_ROOT = 2,  ///< Position and rotation of the root only, 18 bytes per pose.
   STRIDEWIRE_POSE_DETAIL_MAX = 0x7fffffff
 } stridewire_pose_detail;
 
-/// Within `to_m` of a region's centre, the server sends poses every `every_n_ticks` ticks.
+/// A ring of a region. The server sends the poses of the avatars in it every `every_n_ticks` ticks.
 typedef struct stridewire_rate_ring {
   /// Outer radius. It must be above 0 and above the outer radius of the previous ring.
   double to_m;

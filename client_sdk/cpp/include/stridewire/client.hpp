@@ -389,7 +389,7 @@ class Client {
     });
   }
 
-  /// Describes the delay of the display and how many poses arrived too late.
+  /// Returns the delays of the render time and the counts of sampled poses.
   stridewire_playout Playout() const {
     stridewire_playout playout{};
     (void)stridewire_client_get_playout(handle_, &playout);
