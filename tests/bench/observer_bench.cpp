@@ -97,7 +97,7 @@ struct Crowd {
   PoseDelivery delivery;
 };
 
-/// Both ends of a connection over loopback. Received bytes are counted and discarded.
+/// The observer's end of a connection over loopback. Counts and discards the received bytes.
 class Reader {
  public:
   explicit Reader(tcp::acceptor& acceptor) : socket_(acceptor.get_executor()) {
@@ -235,7 +235,8 @@ Wanted Want(const Crowd& crowd, Watch watch, std::mt19937& random,
   return wanted;
 }
 
-/// Passes as many bytes of some frames to the operating system as it accepts.
+/// Passes bytes of frames to the operating system until all are passed or the socket accepts no
+/// more.
 class Writer {
  public:
   explicit Writer(tcp::acceptor& acceptor) : socket_(acceptor.accept()) {

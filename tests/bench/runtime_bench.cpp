@@ -1,5 +1,5 @@
 // Measures the cost of movements, poses and messages on one core, for `builtin` and for each
-// library named after the options:
+// library that the command line names:
 //   stridewire-bench [--instruction-set=NAME] [--benchmark_...] [LIBRARY.swl ...]
 //
 // The kernels use the widest vectors of the machine (AVX-512, AVX2, SSE4, NEON), or the named

@@ -8,8 +8,9 @@
 namespace stridewire {
 
 /// Returns a walker with seven joints whose motion has a closed form, for tests that need expected
-/// values independent of the code under test. Its straight legs swing like compasses. It has 15
-/// steps per foot with lengths 0, 0.2, 0.4 and 0.6 m, and jumps of 0.3 to 1.2 m.
+/// values independent of the code under test. Its straight legs swing like those of a pair of
+/// compasses. It has 15 steps per foot with lengths 0, 0.2, 0.4 and 0.6 m, and jumps of 0.3 to 1.2
+/// m.
 [[nodiscard]] RawLibrary MakeTestRawLibrary();
 
 /// Builds the library of MakeTestRawLibrary. Aborts on failure.
