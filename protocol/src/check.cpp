@@ -89,7 +89,8 @@ void CheckMeaning(Findings& found, const FieldPath& at, const WorldInfo& m) {
   if (m.reduced_joints.empty()) return;
   std::vector<std::int16_t> parents;
   for (const JointInfo& joint : m.skeleton.joints) parents.push_back(joint.parent);
-  // Reduced joints are allowed only with quantizations. Without parents, CheckReducedJoints fails.
+  // Reduced joints are allowed only with quantizations. If there are none, the parents are removed,
+  // so that CheckReducedJoints fails.
   if (count == 0) parents.clear();
   found.That(CheckReducedJoints(m.reduced_joints, parents), {&at, "reduced_joints"});
 }
