@@ -67,7 +67,7 @@ export class WorldPanes {
 
   /**
    * Requests the list of worlds from the server. If no pane is open yet, opens the first two worlds
-   * that have avatars, or else the first two.
+   * that have avatars, or else the first two, or else a new world.
    */
   async fetchServerInfo(): Promise<void> {
     try {

@@ -76,8 +76,8 @@ export interface ClientOptions {
   /** Received poses to keep per avatar for interpolation, 4 to 4096. Default 32. */
   poseHistory?: number;
   /**
-   * Memory limit for all these poses, in bytes. Avatars that do not fit are ignored and counted in
-   * `Statistics.posesRefused`. Default 256 MiB.
+   * Memory limit for all these poses, in bytes. Poses of avatars that do not fit are dropped and
+   * counted in `Statistics.posesRefused`. Default 256 MiB.
    */
   maxPoseBytes?: number;
   /** Length of `World.recording` in seconds, 0 to 3600. 0 disables recording. Default 20. */

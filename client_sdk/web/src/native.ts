@@ -69,8 +69,8 @@ class Native {
     return this.call.memory.buffer;
   }
 
-  /** Copies lists of bytes to the memory for arguments, one after the other, and returns their
-   * number. */
+  /** Copies lists of bytes to the memory for arguments, one after the other. Returns the total
+   * number of bytes. */
   setInput(...lists: Uint8Array[]): number {
     const count = lists.reduce((sum, {length}) => sum + length, 0);
     let at = this.call.input(count);

@@ -41,7 +41,7 @@ export type PoseDetail = 'all' | 'reduced' | 'root';
  * - `pending`: the client will join the world as soon as it is connected.
  * - `joining`: the client has sent the request to join and waits for the reply.
  * - `joined`: the client receives data and may send commands.
- * - `refused`: the server refused the join.
+ * - `refused`: the server refused the join, or `joinWorld` failed.
  * - `left`: `World.leave` was called.
  */
 export type WorldState = 'pending' | 'joining' | 'joined' | 'refused' | 'left';
@@ -310,8 +310,9 @@ export interface World {
   /** The server's first reply to joining. */
   readonly joined: Promise<Reply>;
 
-  // Commands wait until the world is joined. They fail with `closed` while the client is `idle` or
-  // `closed`, and with `invalid_argument` if an argument is invalid. Lists have 1 to 65536 items.
+  // Commands wait until the world is joined. Except `observe` and `leave`, they fail with `closed`
+  // while the client is `idle` or `closed`. They fail with `invalid_argument` if an argument is
+  // invalid. Lists have 1 to 65536 items.
 
   spawn(items: readonly SpawnItem[]): Promise<Reply>;
   remove(avatars: readonly number[]): Promise<Reply>;
@@ -350,8 +351,8 @@ export interface World {
   avatars(): Uint32Array;
   /** Computes the pose of an avatar at a server time, usually `Client.renderTimeS()`. */
   sample(avatar: number, timeS: number, out: Pose): PoseKind;
-  /** Computes the poses of all visible avatars at a server time and returns their number. Allocates
-   * nothing once `out` is large enough. */
+  /** Computes the poses of all observed avatars at a server time and returns their number. Omits
+   * avatars without a pose at this time. Allocates nothing once `out` is large enough. */
   sampleAll(timeS: number, out: CrowdPose): number;
 }
 

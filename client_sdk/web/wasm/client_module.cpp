@@ -5,8 +5,8 @@
 // message that the web client has made, it passes the type and the payload.
 //
 // Numbers that a function returns besides its result are in `results`; the comment of each function
-// lists them after "results:", each with its index. A text has results[kTextBytes] bytes and begins
-// at address results[kTextAt].
+// lists them after "results:", each with its index. If a function sets "the text", results[kTextAt]
+// is its address and results[kTextBytes] its size in bytes (SetText).
 
 #include <algorithm>
 #include <array>
