@@ -8,7 +8,8 @@
 #   deploy/install_deps.sh --no-browser  # without Chromium, which only the viewer's tests need
 #   deploy/install_deps.sh --list        # print the package names, one per line, and exit
 #
-# The output of apt-get goes to a log file in $TMPDIR (default: /tmp). The script prints its name.
+# The output of apt-get goes to a log file in $TMPDIR (default: /tmp). The script prints the name of
+# this file.
 set -euo pipefail
 
 build=(

@@ -44,7 +44,7 @@ class IdSet {
   }
 
  private:
-  // Ids below this are stored as bits, which take at most 128 KB.
+  // Ids below this are stored as bits, which take at most 128 KiB.
   static constexpr AvatarId kSmallIds = 1u << 20;
   std::vector<std::uint64_t> bits_;
   std::vector<AvatarId> large_;
