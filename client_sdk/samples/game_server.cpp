@@ -262,7 +262,8 @@ int RunProgram(int argc, char** argv) {
       ->check(CLI::Range(0.0, 5.0));
   app.add_option("--turn-rad", settings.turn_rad, "Largest turn per step")
       ->check(CLI::Range(0.0, 1.6));
-  app.add_option("--home-m", settings.home_m, "Largest distance from the start; 0: no limit")
+  app.add_option("--home-m", settings.home_m,
+                 "Distance from the middle of the row of avatars at which they turn back; 0: none")
       ->check(CLI::Range(0.0, 1e4));
   try {
     app.parse(argc, argv);
