@@ -1,6 +1,6 @@
 # Compiler flags that all targets of Stridewire share.
 
-option(STRIDEWIRE_UNITY_BUILD "Compile several source files as one, which halves the build time" ON)
+option(STRIDEWIRE_UNITY_BUILD "Compile several sources as one, which saves a third of the time" ON)
 
 # gold, which Debian's binutils contain, links a program in half the time of the default linker.
 # With the sanitizers of clang it prints hundreds of warnings.

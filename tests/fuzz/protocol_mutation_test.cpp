@@ -241,7 +241,7 @@ TEST(ProtocolMutation, PosesAreRejectedOrValid) {
 
   // Compact poses with some changed bits.
   for (const auto& [name, mode] : {std::pair("pose_batch_compact", PoseMode::kCompact),
-                                   std::pair("pose_batch_fewer", PoseMode::kCompactReduced),
+                                   std::pair("pose_batch_reduced", PoseMode::kCompactReduced),
                                    std::pair("pose_batch_root", PoseMode::kCompactRoot)}) {
     SCOPED_TRACE(name);
     const CompactCodec& codec = *SampleCodecs().Find(mode);

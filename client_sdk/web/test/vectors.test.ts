@@ -87,7 +87,7 @@ test('sets joints that a detail leaves out to their references', () => {
       vectors.find((vector) => vector.name === name)!.frame, vectorInfo()).rotations;
   const all = read('pose_batch_compact');
   const batches: [string, {includes(joint: number): boolean}][] =
-      [['pose_batch_fewer', info.reducedJoints], ['pose_batch_root', [0]]];
+      [['pose_batch_reduced', info.reducedJoints], ['pose_batch_root', [0]]];
   for (const [name, joints] of batches) {
     const rotations = read(name);
     info.rotationQuantizations.forEach(({reference}, j) => {

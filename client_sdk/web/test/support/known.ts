@@ -9,7 +9,7 @@ const enumerators = new Set([
   'StopObserving', 'Ping', 'InspectAvatar', 'SetTerrain', 'SetLayers', 'SetPlanting',
   'FetchLibrary', 'Goodbye', 'Welcome', 'WorldInfo', 'Reply', 'PoseBatch', 'Events', 'Lagging',
   'Error', 'Pong', 'AvatarState', 'WorldTerrain', 'Movements', 'LibraryPiece', 'controller',
-  'observer', 'full', 'quantised', 'movement', 'compact', 'compactFewer', 'compactRoot', 'all',
+  'observer', 'full', 'quantised', 'movement', 'compact', 'compactReduced', 'compactRoot', 'all',
   'reduced', 'root', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto',
   'left', 'right', 'stepLeft', 'stepRight', 'accepted', 'started', 'footStrike', 'finished',
   'idle', 'rejected', 'spawned', 'removed', 'entered', 'startX', 'startY', 'startZ', 'endX',
