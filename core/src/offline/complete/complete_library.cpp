@@ -131,8 +131,7 @@ std::optional<Person> MeasurePerson(RawLibrary& library, Completion& completion)
                                    : complete::MeasureStandParts(bent);
     if (!parts) {
       completion.failure =
-          "the captures contain neither a stand nor steps of both feet: in the stillest pose " +
-          *reason;
+          "the captures contain neither a stand nor a step: in the stillest pose " + *reason;
       return std::nullopt;
     }
     completion.stand_reason = *std::move(reason);
