@@ -42,8 +42,8 @@ class Server : public ServerThread {
   /// Runs until the server is drained or stopped. Returns true if it was drained.
   bool Run();
 
-  /// Stops accepting connections, sends pending messages, closes all sessions, and makes Run
-  /// return. Thread-safe.
+  /// Stops accepting clients, answers accepted commands, closes all sessions, and makes Run return,
+  /// at the latest after drain_timeout_s. Thread-safe.
   void Drain();
   /// Makes Run return at once. Thread-safe.
   void Stop();

@@ -10,7 +10,8 @@
 namespace stridewire::server {
 
 /// The limits of the server. Each has a key of the same name in section [limits] of the
-/// configuration. The metric stridewire_limit_reached_total counts how often each was reached.
+/// configuration. The metric stridewire_limit_reached_total counts how often limits were reached
+/// (see Limit).
 struct Limits {
   // Frames.
   std::size_t max_control_bytes = protocol::kMaxControlBytes;  ///< Payload of a control message.
@@ -38,7 +39,7 @@ struct Limits {
   int max_avatars_per_world = 16'384;
   int max_queue = 256;  ///< Waiting requests per avatar.
 
-  // Commands of one session.
+  // Commands. These limits apply to each session, except starts_per_tick and spawns_per_tick.
   int requests_per_s = 50'000;  ///< Command items per second; more are rejected.
   int request_burst = 65'536;   ///< Command items that a session may send at once.
   /// Maximum number of avatars that one command starts per tick, on all shards.
@@ -47,7 +48,8 @@ struct Limits {
   int spawns_per_tick = 512;
   /// Messages of any type. If there are more, the server pauses reading.
   int messages_per_s = 4000;
-  /// Unanswered commands. If there are more, the server pauses reading.
+  /// Unanswered commands. When there are this many, the server pauses reading. Also the maximum
+  /// number of unanswered InspectAvatar queries.
   int max_pending_commands = 256;
 
   // Memory of one session.

@@ -36,7 +36,7 @@ class TimeHistogram {
   [[nodiscard]] std::uint64_t bin(std::size_t i) const { return bins_[i].value(); }
   [[nodiscard]] double sum_s() const { return 1e-9 * static_cast<double>(sum_ns_.value()); }
   [[nodiscard]] double max_s() const { return 1e-9 * static_cast<double>(max_ns_.value()); }
-  /// Returns the largest time since the previous call.
+  /// Returns the largest time observed since the previous call, in seconds; 0 if there was none.
   [[nodiscard]] double TakeRecentMax();
 
  private:

@@ -35,8 +35,9 @@ struct PoseFrames {
 /// is exceeded, the queue drops all movements of the world and shard, and the caller must send new
 /// states.
 ///
-/// Every write takes messages of all kinds, in the order of the sketch, so that no kind starves.
-/// Terrain follows control messages, because it belongs to a WorldInfo that is sent as control.
+/// Every write takes control messages, movements and poses, in the order of the sketch, so that no
+/// kind starves. Terrain waits until no control message is left, because it belongs to a WorldInfo
+/// that is sent as control.
 ///
 /// Memory is bounded. Events that exceed the control budget are rejected, and the session limits
 /// replies by pausing to read commands. Frames are shared by all connections that send them.
@@ -72,15 +73,15 @@ class SendQueue {
     /// Number of frames at the end of `frames` that contain movements or poses.
     std::size_t stream_frames = 0;
     std::size_t bytes = 0;
-    std::uint64_t poses = 0;
-    std::uint64_t batches = 0;
+    std::uint64_t poses = 0;    ///< Poses of the batches whose last frame is in `frames`.
+    std::uint64_t batches = 0;  ///< Number of frames of pose batches.
     void clear();
   };
 
-  /// Clears `out` and moves waiting frames to it: up to `max_bytes` of control messages, one
-  /// terrain if no control message is left, then up to `max_bytes` of movements and up to
-  /// `max_bytes` of poses. At least one waiting frame of control, movements and poses is taken,
-  /// however large it is.
+  /// Clears `out` and moves waiting frames to it: control messages, one terrain if no control
+  /// message is left, then movements, then poses. Of control messages, movements and poses, takes
+  /// frames until there are at least `max_bytes` or 64 frames of the kind. The last frame may
+  /// therefore exceed `max_bytes`.
   void Gather(std::size_t max_bytes, Gathered& out);
 
   [[nodiscard]] bool empty() const {

@@ -35,8 +35,9 @@ class Session : private ConnectionHandler {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Sets the connection of a client that has sent `hello`. A previous connection is closed.
-  /// `received` contains the bytes that were received after Hello.
+  /// Sets the connection of a client that has sent `hello`, and sends Welcome with this value of
+  /// `resumed`. A previous connection is closed. `received` contains the bytes that were received
+  /// after Hello.
   void Attach(std::shared_ptr<Connection> connection, const protocol::Hello& hello, bool resumed,
               std::span<const std::byte> received);
 
@@ -56,8 +57,8 @@ class Session : private ConnectionHandler {
   /// Checks timeouts and sends messages that are due. Called several times per second.
   void Housekeep(Clock::time_point now);
 
-  /// The server is shutting down: closes the connection when no command is pending. The client may
-  /// reconnect later.
+  /// Called when the server is shutting down. Closes the connection when no command is pending; the
+  /// client may reconnect later. A session without a connection ends.
   void Drain();
 
   /// Leaves all worlds and closes the connection. Afterwards the session may be destroyed.

@@ -22,8 +22,8 @@ class SessionDirectory {
     int shard = 0;
   };
 
-  /// Creates a session on the shard with the fewest sessions. Fails with kLimitReached if there are
-  /// too many sessions in total or of this address; `reached` receives the limit.
+  /// Creates a session on the shard with the fewest sessions. If there are too many sessions, in
+  /// total or from this address, fails with kLimitReached and sets `reached` to that limit.
   [[nodiscard]] Outcome<Entry> Open(const std::string& address, Limit& reached);
 
   /// Returns null if no session has this token.

@@ -33,8 +33,8 @@ class SessionHost {
   /// Session::OnResult (WorldCommand), OnInspected (InspectRequest) or OnStates (StatesRequest).
   virtual void SendToShard(int shard, ShardMessage message) = 0;
   /// Sends a message to the main thread. The result of a JoinRequest is passed to
-  /// Session::OnJoined. After a TerrainChange, every shard calls Session::OnResult; if the terrain
-  /// is invalid, Session::OnTerrainRefused is called instead.
+  /// Session::OnJoined. After a TerrainChange, Session::OnResult receives one result per shard; if
+  /// the terrain is refused, Session::OnTerrainRefused is called instead.
   virtual void SendToServer(ServerMessage message) = 0;
   /// Destroys an ended session after the current call has returned.
   virtual void DestroySession(SessionId session) = 0;

@@ -66,8 +66,8 @@ class SessionStream {
  public:
   explicit SessionStream(SessionContext& context);
 
-  // The following functions return the data that the session needs from a world. Without a
-  // connection it needs only the events that are stored for the client.
+  // The following functions return which data of a world the session needs. Without a connection,
+  // it needs only events, which are stored for the client.
   [[nodiscard]] bool WantsEvents(WorldId world) const;
   [[nodiscard]] bool WantsMovements(WorldId world) const {
     return context_.connection != nullptr &&
@@ -122,8 +122,9 @@ class SessionStream {
   /// the tick as soon as those of all shards have arrived.
   void OnGathered(std::uint64_t tick, int shard);
   void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
-  /// Numbers and sends a message. While the client is not connected, stores it instead. Returns how
-  /// many events were dropped.
+  /// Numbers a message, sends it if the client is connected, and stores it in event_replay_. If the
+  /// send queue is full, drops the message instead. Returns how many events were dropped, including
+  /// stored events that event_replay_ has dropped before they were sent.
   std::uint64_t SendEvents(protocol::Events&& message);
   void CountDroppedEvents(WorldId world, std::uint64_t events);
   void CountDroppedBatches(WorldId world, std::uint64_t batches);

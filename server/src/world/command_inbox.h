@@ -13,8 +13,8 @@ namespace stridewire::server {
 ///
 /// Spawning many avatars takes longer than a tick. The inbox therefore limits the spawns per tick
 /// and divides them evenly among the sessions that spawn. The rest of a Spawn waits for the next
-/// tick, together with all later commands of the same session. Commands of other sessions are not
-/// delayed.
+/// tick, together with all later commands of the same session except TerrainPart. Commands of other
+/// sessions are not delayed.
 class CommandInbox {
  public:
   explicit CommandInbox(std::size_t max_spawns_per_tick)
@@ -23,7 +23,8 @@ class CommandInbox {
   void Push(WorldCommand&& command) { commands_.push_back(std::move(command)); }
 
   using Execute = std::function<CommandResult(const WorldCommand&)>;
-  /// Receives the result of a command that shard `from_shard` has posted.
+  /// Receives the result of a command that shard `from_shard` has posted. Not called for commands
+  /// with seq 0.
   using OnResult = std::function<void(int from_shard, CommandResult&&)>;
 
   /// Executes the commands of one tick. A Spawn that takes several ticks has one result, at its

@@ -69,8 +69,8 @@ struct PoseScratch {
 /// poses were used.
 ///
 /// Phases: FinishStep spreads the evaluation over several steps. Slots form groups of 8, and the
-/// groups take turns. A slot that is scheduled outside the turn of its group gets only as many
-/// poses as steps remain until that turn.
+/// groups take turns. A slot that is scheduled outside the turn of its group gets only the poses
+/// until that turn, or a single pose if a whole crowd is scheduled at once.
 ///
 /// Memory layout: the poses of one step are stored together, in the order of slots, in one plane.
 /// The planes form a ring.
@@ -168,7 +168,7 @@ class EncodedPoseCache {
   /// be one of SetModes.
   [[nodiscard]] Encoded Find(std::uint32_t slot, protocol::PoseMode mode) const;
   /// Returns the root position of this step with the precision of the encoded pose. If the pose
-  /// cannot be encoded, returns a position that is out of the range of all others.
+  /// cannot be encoded, all coordinates are kMaxRootM, so that the avatar is far from all regions.
   [[nodiscard]] Vec3 FindRoot(std::uint32_t slot) const;
 
   [[nodiscard]] SoaPoseEvaluator& evaluator() { return scratch_->evaluator; }

@@ -7,10 +7,11 @@
 
 namespace stridewire::server {
 
-/// Describes an avatar for InspectAvatar: its base frame, its movement and its queue. The caller
-/// must set nonce, world, avatar id, tick and times, and add the avatar's offset to
-/// `movement->started_s`, which is in avatar time. Parameters of examples are omitted if they take
-/// more than `max_site_bytes`.
+/// Describes an avatar for InspectAvatar: its base frame, movement, queue, layers and foot
+/// planting. The caller must set `nonce`, `world`, `tick`, `server_time_s`, and `avatar` of the
+/// state and of each queued request. It must also convert `movement->started_s` from the avatar's
+/// time to server time. `movement->sites` is left empty if it would take more than
+/// `max_site_bytes`.
 [[nodiscard]] protocol::AvatarState Inspect(const AvatarSimulation& avatar,
                                             std::size_t max_site_bytes);
 

@@ -25,7 +25,8 @@
 ///     | StatesRequest, Interest -------------> |                           |
 ///     | <--- ShardOutbox, once per tick ------ |                           |
 ///     |                                        |                           |
-///     | JoinRequest, LeaveNotice, TerrainChange, SessionEnded -----------> |
+///     | JoinRequest, LeaveNotice, TerrainChange,                           |
+///     | SessionEnded, SessionRestored -----------------------------------> |
 ///     | <----- JoinResult, TerrainRefusal, WorldCommand (TerrainPart) ---- |
 namespace stridewire::server {
 
@@ -188,7 +189,8 @@ struct PoseDelivery {
   protocol::PoseMode mode = protocol::PoseMode::kFull;
   int from_shard = 0;
   std::uint64_t tick = 0;
-  std::uint32_t avatar_count = 0;  ///< Number of avatars in `parts`.
+  /// Number of poses in `parts` or, if it is empty, in `rows`.
+  std::uint32_t avatar_count = 0;
   /// Batch of all avatars; empty if no session observes all avatars.
   std::vector<SharedFrame> parts;
   /// The encoded poses from which sessions compose smaller batches. Contains at least the poses of
@@ -244,7 +246,7 @@ struct LeaveNotice {
   WorldId world = 0;
 };
 
-/// Requests that the main thread validates and encodes a terrain. On success, it sends a
+/// Asks the main thread to validate and encode a terrain. On success, it sends a
 /// TerrainPart to all shards. Otherwise, it sends a TerrainRefusal to `from_shard`.
 struct TerrainChange {
   std::shared_ptr<World> world;

@@ -438,7 +438,7 @@ void WorldShard::RecordMovements() {
   }
   const std::size_t parts = movements_.size() - first;
   // There are too many parts only if the frame limit is far below the default. Clients then detect
-  // a missing step and request new states.
+  // a missing step and discard the avatars of this shard.
   if (parts > protocol::kMaxBatchParts) {
     metrics_.pose_errors.Add(ordered.size());
     movements_.resize(first);

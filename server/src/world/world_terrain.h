@@ -23,8 +23,8 @@ struct WorldTerrain {
 [[nodiscard]] Expected<std::shared_ptr<const WorldTerrain>> MakeWorldTerrain(
     protocol::WorldId world, std::shared_ptr<const Terrain> terrain, protocol::Encoder& encoder);
 
-/// The current terrain of a world, for all threads. It is locked only when the terrain is set or a
-/// client joins, never in a tick.
+/// The current terrain of a world, for all threads. It is locked when the terrain is set, a client
+/// joins or resumes, or a WorldShard is created, but not by the ticks of a WorldShard.
 class TerrainSlot {
  public:
   /// Returns null if no terrain was ever set. The ground is then flat.
