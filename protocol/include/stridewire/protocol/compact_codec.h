@@ -17,9 +17,9 @@ namespace stridewire::protocol {
 [[nodiscard]] Status CheckRotationQuantizations(std::span<const RotationQuantization> codes);
 
 /// Checks the joints of PoseDetail::kReduced. `parents` contains the parent of each joint of the
-/// skeleton. `joints` must be ascending, and contain the root and the parents of all its joints.
-/// Fails with kShapeMismatch if there are more joints than in the skeleton. All other errors are
-/// kMalformed, and Error::index is the position in `joints`.
+/// skeleton. `joints` must be ascending, and contain the root and the parent of every other joint
+/// in the list. Fails with kShapeMismatch if there are more joints than in the skeleton. All other
+/// errors are kMalformed, and Error::index is the position in `joints`.
 [[nodiscard]] Status CheckReducedJoints(std::span<const std::uint16_t> joints,
                                         std::span<const std::int16_t> parents);
 

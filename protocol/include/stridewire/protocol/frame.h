@@ -23,7 +23,7 @@ enum class Sender : std::uint8_t { kClient, kServer };
 [[nodiscard]] bool MaySend(Sender sender, MessageType type);
 
 /// Returns whether messages of this type may be as large as FrameLimits::max_bulk_bytes, because
-/// they can hold data of a whole crowd.
+/// they can contain a terrain, a piece of a library or data of a whole crowd.
 [[nodiscard]] bool IsBulk(MessageType type);
 
 /// Limits of payload sizes in bytes. The defaults are those of STANDARD.md. A program may use

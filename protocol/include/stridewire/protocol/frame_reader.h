@@ -19,8 +19,9 @@ namespace stridewire::protocol {
 ///     Handle(**next);
 ///   }
 ///
-/// Buffers at most one frame. Its memory is at most twice the number of received bytes of that
-/// frame, so a header alone cannot make it allocate a large buffer. Not thread-safe.
+/// Buffers at most one frame. The buffer takes at most twice the number of received bytes of that
+/// frame, or 4 KiB if that is more, so a header alone cannot make it allocate a large buffer. A
+/// buffer of up to 1 MiB is kept for the following frames. Not thread-safe.
 class FrameReader {
  public:
   /// `sender` is the side that sends the frames. Types that it may not send are errors.

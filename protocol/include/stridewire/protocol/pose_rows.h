@@ -18,7 +18,7 @@ namespace stridewire::protocol {
 ///
 ///   avatars   7    8    11   15         ascending; shared, because the list rarely changes
 ///   flags     0    2    0    0
-///   begins    0   150  150  301  450    begin of each row, and the end; row 8 is empty
+///   begins    0   150  150  301  450    begin of each row, and the end; avatar 8 has no pose
 ///   bytes     [ pose 7 ][ pose 11 ][ pose 15 ]
 ///
 /// Rows may differ in length. Reuses its memory for every tick. Not thread-safe while rows are
