@@ -47,7 +47,8 @@ constexpr int kVariations = 256;
 constexpr int kCrowd = 1000;
 constexpr double kTickS = 1.0 / 60.0;
 
-/// Returns parameters inside the hull of a group's examples: random means of three sites.
+/// Returns parameters inside the hull of a group's examples: means of three sites with random
+/// weights.
 std::vector<std::vector<double>> Parameters(const MotionGroup& group) {
   std::mt19937 random(1);
   std::vector<std::vector<double>> all(kVariations);

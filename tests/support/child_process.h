@@ -60,8 +60,8 @@ class ChildProcess {
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
-  /// Returns the next line of stdout without its line end. Empty after `timeout_s` or at the end of
-  /// the output.
+  /// Returns the next line of stdout without its line end, or nullopt after `timeout_s` or at the
+  /// end of the output.
   std::optional<std::string> ReadLine(double timeout_s = 60.0) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_s);
     for (;;) {

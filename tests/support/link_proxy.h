@@ -29,9 +29,9 @@ class LinkProxy {
   struct Link {
     double latency_s = 0.0;
     double jitter_s = 0.0;       ///< Half of the range of the latency.
-    double stall_every_s = 0.0;  ///< 0: never.
-    double stall_s = 0.0;
-    double cut_every_s = 0.0;  ///< 0: never.
+    double stall_every_s = 0.0;  ///< Interval of stalls; 0: never.
+    double stall_s = 0.0;        ///< Duration of a stall.
+    double cut_every_s = 0.0;    ///< Interval at which the connection is closed; 0: never.
   };
 
   LinkProxy(std::uint16_t server_port, const Link& link, std::uint64_t seed)

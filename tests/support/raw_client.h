@@ -52,7 +52,7 @@ class RawClient {
     return std::nullopt;
   }
 
-  /// Reads until the server closes. Returns false if it does not.
+  /// Reads until the server closes the connection. Returns false if it does not within `patience`.
   [[nodiscard]] bool AwaitClose(std::chrono::milliseconds patience = kPatience);
 
   /// Resets the connection, like a failed network.

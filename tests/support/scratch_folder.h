@@ -36,7 +36,7 @@ class ScratchFolder {
     return File(name);
   }
 
-  /// Returns the number of files and folders in it.
+  /// Returns the number of files and folders in the folder and its subfolders.
   [[nodiscard]] int Count() const {
     int count = 0;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(path_)) {

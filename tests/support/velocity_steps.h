@@ -17,8 +17,9 @@ struct VelocityStep {
   double root_m_s = 0.0;
 };
 
-/// Measures changes of velocity frame by frame. Fingers and thumbs are ignored: in captures they
-/// twitch by up to 186 rad/s, and a bound that allows this would not detect faults of other joints.
+/// Measures changes of velocity frame by frame. Hands, fingers and thumbs are ignored: in captures,
+/// fingers twitch by up to 186 rad/s, and a bound that allows this would not detect faults of other
+/// joints.
 class VelocitySteps {
  public:
   VelocitySteps(const Skeleton& skeleton, double fps)

@@ -86,7 +86,7 @@ void ReFrame(Frames frames, Random& random, Rig& rig);
 /// Turns the whole world: positions become `turn` times their old value, and the rest pose turns as
 /// well.
 void TurnWorld(const DQuat& turn, Rig& rig);
-/// Moves the motion.
+/// Shifts the whole motion in the world.
 void Translate(const DVec3& by_m, Rig& rig);
 /// Multiplies all lengths.
 void Scale(double factor, Rig& rig);
