@@ -18,14 +18,14 @@
 
 namespace stridewire::server {
 
-/// A request.
+/// The parts of an HTTP request that pages use. The views are valid until the response is sent.
 struct HttpQuery {
   std::string_view path;           ///< Path as received, without the query after '?'.
   std::string_view fields;         ///< The query, such as "a=1&b=2".
   std::string_view if_none_match;  ///< Value of the header If-None-Match; empty if it is missing.
 };
 
-/// A response.
+/// An HTTP response.
 struct HttpAnswer {
   unsigned status = 200;
   std::string content_type = "text/plain; charset=utf-8";

@@ -34,7 +34,7 @@ class LibraryPages {
   static constexpr int kMaxCells = 64;
   static constexpr double kFramesPerS = 30.0;
 
-  /// Adds a library. `name` is shown to users.
+  /// Adds a library, unless one with the same hash was added before. `name` is shown to users.
   void Add(std::string name, std::shared_ptr<const MotionLibrary> library);
 
   /// Returns nullopt if the path is not below /libraries.

@@ -42,7 +42,7 @@ struct Config {
   Endpoint listen = {"127.0.0.1", 7420};
   Endpoint http = {"127.0.0.1", 7421};
   bool http_enabled = true;
-  /// Origins of pages of other servers that may open a stream.
+  /// Origins whose pages may open a stream, in addition to the server's own pages.
   std::vector<std::string> allowed_origins;
   /// Addresses and networks of proxies (TrustedProxies::Parse).
   std::vector<std::string> trusted_proxies;

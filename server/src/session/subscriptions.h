@@ -71,7 +71,8 @@ class Subscriptions {
   /// are needed, or if no poses are needed.
   [[nodiscard]] std::span<const AvatarId> SelectedAvatars(WorldId world,
                                                           protocol::PoseMode mode) const;
-  /// Returns the rings of this mode of the region of this world, or nullopt if there are none.
+  /// Returns a filter for the rings of this mode in the region of this world, or nullopt if there
+  /// are none.
   [[nodiscard]] std::optional<RegionFilter> FilterOf(WorldId world, protocol::PoseMode mode) const;
 
   [[nodiscard]] Share ShareOf(const PoseDelivery& delivery) const;

@@ -18,7 +18,8 @@
 
 /// All messages between the threads of the server: from shard to shard (ShardMessage), and between
 /// the shards and the main thread (ServerMessage, ShardMessage). They are values, which the
-/// receiver owns. Shard::Post and ServerThread::Post are the only ways to send them.
+/// receiver owns. Shard::Post and ServerThread::Post are the only ways to send them to another
+/// thread.
 ///
 ///   session's shard                      avatars' shard               main thread
 ///     | WorldCommand, InspectRequest,          |                           |
