@@ -136,7 +136,7 @@ class CompactCodec {
   /// rotation is outside the range of its quantization, the root exceeds kMaxRootM, a number is not
   /// finite, or the length of a quaternion deviates from 1 by more than 1e-5.
   void Encode(Block& block) const;
-  /// Encodes poses of the caller instead, which replace those of the block.
+  /// Encodes poses of the caller instead of those that Add has added. Get does not return them.
   void Encode(const SoaPoses& poses, Block& block) const;
 
   /// Decodes a pose. `in` needs no alignment. Rotations are unit to float32 precision. Fails with
