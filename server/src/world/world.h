@@ -34,7 +34,7 @@ struct World {
   std::atomic<std::int64_t> avatar_count{0};  ///< Avatars that exist or are being spawned.
   std::atomic<AvatarId> last_id{0};           ///< Largest avatar id that any Spawn has used.
   TerrainSlot
-      terrain;  ///< The latest terrain. Each shard applies it to its avatars at a given tick.
+      terrain;  ///< The latest terrain. Shards apply it to their avatars at TerrainPart::tick.
 };
 
 /// Returns the shard that owns an avatar.

@@ -15,7 +15,7 @@ class WorldInterest {
   /// Sets the interest of shard `interest.shard`, which replaces its previous one.
   void Set(const Interest& interest);
 
-  /// Poses that a shard must send in a given tick.
+  /// Poses that the sessions of one shard need in a given tick.
   struct Demand {
     bool all = false;     ///< True if a batch of all avatars is needed.
     bool subset = false;  ///< True if poses of selected avatars or regions are needed.
