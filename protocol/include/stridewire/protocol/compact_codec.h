@@ -27,7 +27,7 @@ namespace stridewire::protocol {
 struct CompactJoint {
   float reference[4] = {};  ///< x, y, z, w
   float low[3] = {};        ///< Smallest x, y and z that can be encoded.
-  /// Distance of neighbouring values of x, y and z; with "smallest three", step[0] applies to all.
+  /// Distance between adjacent values of x, y and z; with "smallest three", step[0] applies to all.
   float step[3] = {};
   float inverse_step[3] = {};  ///< 1 / step
   std::int32_t bits[3] = {};
