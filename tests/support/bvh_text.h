@@ -26,7 +26,8 @@ struct BvhText {
   int frames = 12;
   std::string frame_time = "0.0333333";
   std::string frames_text;  ///< Replaces the number after `Frames:` if not empty.
-  /// The file axes in which x, y and z of the figure point: +-1, +-2 or +-3, forming a rotation.
+  /// The axes of the file (1: x, 2: y, 3: z; negative: inverted) in which the figure's x, y and z
+  /// axes point. They must form a rotation.
   std::array<int, 3> axes{1, 2, 3};
 
   struct Part {

@@ -85,7 +85,7 @@ RawLibrary DrawLibrary(int parameter_count, int example_count, double reach_m,
     group.parameters.push_back(kOrder[l]);
   }
   while (static_cast<int>(group.examples.size()) < example_count) {
-    // Measures that are not parameters are equal in all examples.
+    // Quantities that are not parameters are the same in all examples.
     DVec3 start(0.2, 0.0, -0.3 * reach_m);
     DVec3 end(0.2, 0.0, 0.0);
     double turn_rad = 0.0;
