@@ -42,7 +42,8 @@ struct Config {
   Endpoint listen = {"127.0.0.1", 7420};
   Endpoint http = {"127.0.0.1", 7421};
   bool http_enabled = true;
-  /// Origins whose pages may open a stream, in addition to the server's own pages.
+  /// Origins of web pages that may open a WebSocket to /stream, in addition to the origin of the
+  /// server itself (OriginPolicy).
   std::vector<std::string> allowed_origins;
   /// Addresses and networks of proxies (TrustedProxies::Parse).
   std::vector<std::string> trusted_proxies;

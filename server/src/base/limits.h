@@ -69,7 +69,7 @@ struct Limits {
   int max_http_connections = 64;
 };
 
-/// Limits that stridewire_limit_reached_total counts.
+/// Labels of the metric stridewire_limit_reached_total.
 enum class Limit : std::uint8_t {
   kFrameBytes,
   kHandshakes,

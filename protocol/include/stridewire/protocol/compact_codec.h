@@ -86,8 +86,8 @@ class CompactCodec {
     const float* roots_m;    ///< [x y z][kBlock]
     const float* rotations;  ///< [joint][x y z w][kBlock]
     std::size_t count;       ///< Number of valid poses, at most kBlock.
-    /// The caller guarantees that rotations are unit quaternions or NaN, so the encoder does not
-    /// check their lengths.
+    /// True: the caller guarantees that rotations are unit quaternions or NaN, so the encoder does
+    /// not check their lengths.
     bool are_unit = false;
   };
 
