@@ -237,7 +237,8 @@ std::vector<ConfigKey> MakeKeys() {
   };
   limit("max_control_bytes", "Payload of a control message, in bytes", &Limits::max_control_bytes,
         std::size_t{1024}, protocol::kMaxControlBytes);
-  limit("max_bulk_bytes", "Payload of a message about many avatars, in bytes",
+  limit("max_bulk_bytes",
+        "Payload of a message about many avatars, a terrain or a library, in bytes",
         &Limits::max_bulk_bytes, std::size_t{64 * 1024}, protocol::kMaxBulkBytes);
   limit("max_handshakes", "Connections that have not sent Hello yet", &Limits::max_handshakes, 1,
         65'536);
@@ -274,7 +275,7 @@ std::vector<ConfigKey> MakeKeys() {
         &Limits::spawns_per_tick, 1, 1'000'000);
   limit("messages_per_s", "Messages per second and session; reading pauses beyond them",
         &Limits::messages_per_s, 1, 100'000'000);
-  limit("max_pending_commands", "Unanswered commands per session; reading pauses beyond them",
+  limit("max_pending_commands", "Unanswered commands per session; reading pauses at this number",
         &Limits::max_pending_commands, 1, static_cast<int>(protocol::kReplyCache));
   limit("control_buffer_bytes", "Waiting outgoing messages per session, without poses, in bytes",
         &Limits::control_buffer_bytes, std::size_t{64 * 1024}, 1024 * kMiB);
