@@ -18,8 +18,8 @@ static_assert(sizeof(Quat) == 16 && sizeof(Vec3) == 12);
 
 inline constexpr Quat kIdentityQuat = Quat(1.0f, 0.0f, 0.0f, 0.0f);
 
-/// Returns the rotation by a = `yaw_rad` about +Y: (0, sin a/2, 0, cos a/2) in x, y, z, w. Gives
-/// the same bits on every machine.
+/// Returns the rotation by a = `yaw_rad` about +Y: (0, sin a/2, 0, cos a/2) in x, y, z, w. The
+/// result has the same bits on every machine.
 [[nodiscard]] Quat YawRotation(double yaw_rad);
 
 /// Computes the heading of a rotation: atan2(z'_x, z'_z) with z' = q z q^-1 (paper, Section 5). If
@@ -35,13 +35,13 @@ bool HeadingOf(const Quat& rotation, double& heading_rad);
 /// Wraps an angle to (-pi, pi].
 [[nodiscard]] double WrapAngle(double angle_rad);
 
-/// Returns q / |q|, or the identity if |q| < 1e-12. Gives the same bits on every machine, because
-/// it uses only square root and division.
+/// Returns q / |q|, or the identity if |q| <= 1e-12 or q contains NaN. The result has the same bits
+/// on every machine, because the function uses only correctly rounded operations.
 [[nodiscard]] Quat Normalise(const Quat& q);
 
 /// Returns slerp(1, q, fraction) along the shorter arc, with `fraction` in [0, 1]. If w < 0, it is
 /// computed from -q, which is the same rotation. Half of a rotation by 6 degrees is therefore a
-/// rotation by 3 degrees, not by 177. Gives the same bits on every machine.
+/// rotation by 3 degrees, not by 177. The result has the same bits on every machine.
 [[nodiscard]] Quat SlerpFromIdentity(const Quat& q, float fraction);
 
 /// Returns the angle of the rotation a^-1 b, in [0, pi].

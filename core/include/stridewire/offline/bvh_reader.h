@@ -37,14 +37,16 @@ struct Capture {
   std::vector<std::string> notes;  ///< Assumptions and repairs of the reader, one sentence each.
 };
 
-/// Limits on a BVH file. A file that exceeds one of them is rejected with kLimitExceeded.
-/// kMaxJoints limits the number of joints. Memory use depends on the data in the file, not on the
-/// counts that its header declares.
+/// Limits on a BVH file. A file that exceeds kMaxBvhNumber is rejected with kOutOfRange. A file
+/// that exceeds one of the other limits, or has more than kMaxJoints joints, is rejected with
+/// kLimitExceeded. Memory use depends on the data in the file, not on the counts that its header
+/// declares.
 inline constexpr std::uint64_t kMaxBvhBytes = std::uint64_t{512} << 20;
 inline constexpr int kMaxBvhDepth = 128;  ///< Maximum depth of nested joints.
 /// Maximum number of frames times joints.
 inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;
-inline constexpr double kMaxBvhNumber = 1e7;  ///< Maximum magnitude of any number in the file.
+/// Maximum magnitude of any number in the file, except the number of frames in its header.
+inline constexpr double kMaxBvhNumber = 1e7;
 
 /// Maximum length of the name of a joint, in bytes.
 inline constexpr std::size_t kMaxBvhNameBytes = 256;
@@ -57,9 +59,9 @@ struct BvhReadOptions {
   /// Name of the left ankle joint; empty: detected. Set both ankles or neither.
   std::string left_ankle;
   std::string right_ankle;  ///< Name of the right ankle joint; empty: detected.
-  /// Name of a toe joint below `left_ankle`; empty: detected.
+  /// Name of a toe joint below the left ankle; empty: detected.
   std::string left_ball;
-  std::string right_ball;  ///< Name of a toe joint below `right_ankle`; empty: detected.
+  std::string right_ball;  ///< Name of a toe joint below the right ankle; empty: detected.
 };
 
 /// Reads a BVH file and converts it to Stridewire's conventions: metres, +Y up, facing +Z at
@@ -82,9 +84,9 @@ struct BvhReadOptions {
 ///   root. Branches that are no part of the body, such as cameras, are left out if they begin above
 ///   the root.
 /// - Position channels of the root replace its OFFSET. For other joints, the mean of the position
-///   channels becomes the offset, and a note states the largest deviation from it. If the mean
-///   moves a joint of the legs, the trunk or the arms by more than 2 cm, the file is rejected. If
-///   all positions of a joint are zero, its OFFSET is kept.
+///   channels becomes the offset, and a note states the largest deviation from it. If a joint of
+///   the legs, the trunk or the arms is ever more than 2 cm from its mean position, the file is
+///   rejected. If all positions of such a joint are zero, its OFFSET is kept.
 /// - If `Frame Time` agrees with a whole number of frames per second within the precision of its
 ///   digits, the reader uses that number.
 /// - The reader detects legs by joint names that end in the side and the part of the leg. If that
@@ -93,13 +95,15 @@ struct BvhReadOptions {
 ///   joint that never bends the leg, such as a twist joint, is part of the thigh or the shin and
 ///   does not count as the knee. A figure without two legs, or with more than two, is rejected. If
 ///   there is no toe joint, the ball of the foot is a fixed point in the frame of the ankle. This
-///   point is the End Site of the foot if the End Site is nearer than 0.2 leg lengths. Otherwise
-///   its horizontal distance from the ankle is 2/3 of that of the End Site, and it is as high as
-///   the End Site when the sole is flat.
+///   point is the End Site of the foot if the End Site is within 0.2 leg lengths of the ankle.
+///   Otherwise its horizontal distance from the ankle is 2/3 of that of the End Site, and it is as
+///   high as the End Site when the sole is flat.
 /// - If the figure stands in the rest pose, this pose determines the up axis. If it does not, or if
-///   it clearly stands and moves along another axis in the motion, the up axis is the mean
-///   direction from ankles to hips over the motion. A rest pose that stands is turned to face +Z.
-///   Otherwise the frames of the joints keep their axes, except for the change of the up axis.
+///   it clearly stands along another axis in the motion, the up axis is the axis nearest to the
+///   mean direction from ankles to hips over the motion. If the motion is inconclusive as well, or
+///   if the figure lies on the floor, the up axis is a guess (UpSource::kGuess). A rest pose that
+///   stands is turned to face +Z. Otherwise the frames of the joints keep their axes, except for
+///   the change of the up axis.
 /// - The unit is the common unit (m, ft, dm, 1/0.45 inch, inch, cm or mm) for which the legs are
 ///   0.68 to 1.0 m long. If no unit fits, the motion is scaled so that standing hips are at 0.95 m.
 /// - `Capture::first_frame` skips an artificial rest pose at the start. The reader assumes such a
@@ -108,8 +112,8 @@ struct BvhReadOptions {
 ///   rotated in frame 1 but not in frame 0, and at least four joints rotate at more than 600
 ///   degrees/s between these frames. Besides frame 0, it skips frames while at least two joints
 ///   rotate at more than 600 degrees/s, up to 0.1 s in total.
-/// - If `Frame Time` implies feet that are too slow for a person, the reader adds a note; use `fps`
-///   to override it. A file without `Frame Time` needs `fps`.
+/// - If `Frame Time` implies accelerations of the feet that are too low for a person, the reader
+///   adds a note; use `fps` to override `Frame Time`. A file without `Frame Time` needs `fps`.
 ///
 /// Errors: kNotFound or kIo if the file cannot be read. kMalformed, kOutOfRange, kLimitExceeded or
 /// kUnsupported for its contents, with "file:line" in `where`, or the file name alone if the error

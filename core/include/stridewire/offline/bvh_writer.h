@@ -24,8 +24,8 @@ namespace stridewire {
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out);
 
 /// Does the same for a file. Writes a temporary file in the same folder and renames it, so that
-/// `path` contains either its previous content or the complete clip. Fails with kIo, with the path
-/// in Error::where.
+/// `path` contains either its previous content or the complete clip. Errors: the same, and kIo if
+/// the file cannot be created or renamed. Error::where is the path.
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip,
                               const std::filesystem::path& path);
 

@@ -44,17 +44,18 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 /// `movements` is required. `start` and its fields are optional (default: the origin, heading 0),
 /// and so is `terrain` (default: flat at y = 0). Unknown and duplicate keys are errors.
 ///
-/// - step: requires either `length_m`, with optional side, height and turn, or `at_m`, the world
-///   position where the ball of the foot lands. With `at_m`, `heading_rad` of the footprint is
-///   optional. With `exact_only`, the step is skipped unless the foot lands exactly at the
-///   requested place. It cannot be combined with `allow_nearest`.
+/// - step: requires either `length_m`, with optional `side_m`, `height_m` and `turn_rad`, or
+///   `at_m`, the world position where the ball of the foot lands. With `at_m`, the heading of the
+///   footprint, `heading_rad`, is optional. With `exact_only`, the step is skipped if the foot
+///   cannot land exactly at the requested place. `exact_only` and `allow_nearest` cannot be
+///   combined.
 /// - step and jump: skipped if the nearest movement of the library misses the request by more than
 ///   0.2 m or 60 degrees. With `"allow_nearest": true`, that movement is played.
 /// - walk_to: requires `position_m` and `heading_rad`.
 /// - jump: requires `length_m`.
 /// - stand: requires `seconds`.
-/// - layer: requires `name`. It takes no time. It starts, changes or (with `"enabled": false`)
-///   stops the layer when the following movement begins.
+/// - layer: requires `name`. This entry takes no time. It starts, changes or (with
+///   `"enabled": false`) stops the layer when the following movement begins.
 struct Choreography {
   BaseFrame start;
   std::shared_ptr<const Terrain> terrain;  ///< Terrain of the world; null: flat ground.
@@ -67,11 +68,15 @@ struct Choreography {
 /// Reads a choreography. Checks numbers against the limits in movement_request.h, but not whether a
 /// library supports the movements. For that, use ValidateRequest.
 ///
-/// Errors: kNotFound or kIo, with the file in Error::where. With "file:line:column": kMalformed if
-/// the text is not JSON, kOutOfRange for a number too large for a double, kLimitExceeded if values
-/// are nested too deeply. kMalformed, kOutOfRange, kShapeMismatch or kLimitExceeded, with the
-/// field, for example "c.json: movements[3].step.length_m". kLimitExceeded, with the file, if it is
-/// too large.
+/// Errors, by what Error::where contains:
+///
+/// - The file: kNotFound or kIo if it cannot be read, kLimitExceeded if it is too large, and
+///   kMalformed if the JSON text is not an object.
+/// - "file:line:column": kMalformed if the text is not JSON or contains a duplicate key,
+///   kOutOfRange if a number is too large for a double, kLimitExceeded if values are nested too
+///   deeply.
+/// - A field, for example "c.json: movements[3].step.length_m", if its value is invalid:
+///   kMalformed, kOutOfRange, kShapeMismatch or kLimitExceeded.
 [[nodiscard]] Expected<Choreography> ReadChoreography(const std::filesystem::path& path);
 
 /// Same as ReadChoreography, for text in memory. `name` replaces the path in errors.

@@ -15,17 +15,18 @@ namespace stridewire {
 
 /// Determines which of the extracted examples LibraryBuilder keeps.
 struct SelectionOptions {
-  /// Maximum error of a step that is not kept: the mean distance between its joints and those of
-  /// the step blended from the kept examples, at equal generic times. It is also the maximum
-  /// distance of the step's parameters from the hull of the kept examples, after that hull has been
-  /// enlarged by 10 %. In metres; one radian counts as 0.5 m. 0 keeps every step.
+  /// Maximum error of an example that is not kept: the mean distance between its joints and those
+  /// of the movement blended from the kept examples, at equal generic times. It is also the maximum
+  /// distance of the example's parameters from the hull of the kept examples, after that hull has
+  /// been enlarged by 10 %. In metres; one radian counts as 0.5 m. 0 keeps every example.
   double max_pose_error_m = 0.0;
-  /// For each step, the other steps predict its pose and duration from its parameters. The step is
-  /// an outlier if its pose error exceeds the median of the group, or if its duration error differs
-  /// from the median, by more than this number of deviations. A deviation is 1.4826 times the
-  /// median absolute deviation, and at least 2 mm or 5 ms. Only steps inside the hull of the others
-  /// are tested, in groups of at least eight, because steps at the border of the hull are rare, not
-  /// wrong. At most one step in ten is removed. 0 disables the test.
+  /// For each example, the other examples predict its pose and duration from its parameters. The
+  /// example is an outlier if its pose error exceeds the median of the group, or if its duration
+  /// error differs from the median, by more than this number of deviations. A deviation is 1.4826
+  /// times the median absolute deviation, but at least 2 mm for poses and 5 ms for durations. Only
+  /// examples inside the hull of the others are tested, because examples at the border of the hull
+  /// are rare, not wrong. At most one example in ten is removed, so groups of fewer than ten are
+  /// not tested. 0 disables the test.
   double outlier_deviations = 0.0;
 };
 
@@ -83,7 +84,7 @@ struct LibraryBuilder {
   [[nodiscard]] static LibraryBuilder Selecting();
 
   /// Approximate number of grid cells per second of mean duration. Intervals in which an example
-  /// would be stored with an error above 0.45 degrees have more cells.
+  /// would be stored with a mean error above 0.45 degrees have more cells.
   double grid_fps = 30.0;
   /// Examples are averaged if their parameters are within this distance of each other, in metres; a
   /// radian counts as 0.5 m. They are grouped by complete-linkage clustering. With 0, only

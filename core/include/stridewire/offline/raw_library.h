@@ -48,10 +48,12 @@ struct RawLayer {
 /// The editable form of a motion library. LibraryBuilder converts it to an immutable MotionLibrary.
 struct RawLibrary {
   Skeleton skeleton;
-  /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
+  /// Standing pose. The root is at x = z = 0 with heading 0, and y is its height above the ground.
   Pose stand_pose;
-  /// Sum of the deviations of the ankle and toe heights in `stand_pose` from those of flat feet; 0
-  /// if the feet are flat. If it is too large, CompleteLibrary replaces the stand pose.
+  /// Deviation of the feet in `stand_pose` from flat feet. It is a sum over both ankles and both
+  /// toe tips: each adds the difference between its height above the ball and that of a flat foot,
+  /// minus 1.5 cm, or 0 if the difference is smaller. If the sum is too large, CompleteLibrary
+  /// replaces the stand pose.
   double stand_tilt_m = 0.0;
   std::vector<RawGroup> groups;
   std::vector<RawLayer> layers;

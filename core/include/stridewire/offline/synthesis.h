@@ -44,10 +44,12 @@ struct MovementRecord {
   bool clamped = false;
   std::vector<float> weights;
   std::vector<PlantRecord> plants;
-  /// Steps only: horizontal distance of the moving foot from its target when it has just landed.
-  /// Without planting: distance between the measured and the requested end parameters.
+  /// Steps only: horizontal distance of the moving foot from the requested footprint when the foot
+  /// has just landed. Without planting: distance between the measured and the requested position of
+  /// the foot at the end.
   double landing_error_m = 0.0;
-  /// Difference between the heading of the moving foot and that of its target at that time.
+  /// Steps only: difference between the headings of that foot and of the requested footprint.
+  /// Without planting: difference between the measured and the requested turn.
   double landing_error_rad = 0.0;
   BaseFrame base;  ///< Base frame after the movement.
 };
@@ -100,8 +102,8 @@ struct SynthesisInput {
   std::span<const MovementRequest> requests;
   double fps = 60.0;  ///< Ticks per second, 10 to 1000.
   AvatarOptions options;
-  /// Must be sorted by `before`. Each cue takes effect in the frame after the start of its
-  /// movement, or of a step that is inserted before that movement.
+  /// Must be sorted by `before`. Each cue takes effect in the frame after its request has started
+  /// or has been skipped.
   std::span<const LayerCue> layers;
 };
 

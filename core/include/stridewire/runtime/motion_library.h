@@ -211,9 +211,11 @@ class MotionLibrary {
   /// True if the library has motion for standing avatars. It is generated from the stand pose if
   /// feet can be planted (LegRig::is_usable).
   [[nodiscard]] bool has_stand_motion() const { return stand_motion_ != nullptr; }
-  /// Index of the group that contains the stand pose. Avatars blend into it after their last step.
+  /// Index of the group that contains the stand pose. Avatars blend into this pose after their last
+  /// step. The group exists only if has_stand_motion().
   [[nodiscard]] int settle_group() const { return static_cast<int>(file_group_count_); }
-  /// Index of the group with the loop that standing avatars play.
+  /// Index of the group with the loop that standing avatars play. The group exists only if
+  /// has_stand_motion().
   [[nodiscard]] int idle_group() const { return static_cast<int>(file_group_count_) + 1; }
   /// Clips that can be played over movements, at most kMaxLayerClips. Their names are unique.
   [[nodiscard]] std::span<const LayerClip> layers() const;

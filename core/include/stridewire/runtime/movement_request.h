@@ -131,7 +131,7 @@ inline constexpr double kMaxRequestErrorRad = 1.0471975511965976;  ///< 60 degre
 /// Limits on requests. They are far wider than the range of any library, so they reject only absurd
 /// values.
 inline constexpr double kMaxRequestLengthM =
-    10.0;  ///< Maximum magnitude of lengths, sides and heights.
+    10.0;  ///< Maximum magnitude of lengths, sideways distances and heights.
 inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;
 /// Maximum magnitude of a coordinate of a goal, waypoint or footprint.
@@ -141,10 +141,10 @@ inline constexpr double kMinWalkSpeedMPerS = 0.05;
 inline constexpr double kMaxWalkSpeedMPerS = 5.0;
 inline constexpr std::size_t kMaxWaypoints = 64;
 
-/// Checks a request. Errors: kOutOfRange if a number is not finite or exceeds its limit;
-/// kInvalidArgument if both `exact_only` and `allow_nearest` are set; kUnsupported if the library
-/// has no movement of the requested kind or, for a walk, lacks steps of one foot. Error::where is
-/// "step", "jump", "walk_to" or "stand".
+/// Checks a request. Errors: kOutOfRange if a number is not finite or out of range, or if there are
+/// too many waypoints; kInvalidArgument if both `exact_only` and `allow_nearest` are set;
+/// kUnsupported if the library has no such movement: no step of the requested foot, no jump or, for
+/// a walk, no steps of one foot. Error::where is "step", "jump", "walk_to" or "stand".
 [[nodiscard]] Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request);
 
 /// Values of the parameters of a group, in the order of MotionGroup::parameters.

@@ -65,9 +65,9 @@ struct TerrainData {
 ///
 ///   height(x, z) = max(field(x, z) or 0, tops of all boxes that contain (x, z))
 ///
-/// Immutable, so avatars and threads may share it. Queries never allocate and give the same bytes
-/// on every machine. They find nearby boxes in a uniform grid. A position that is not finite is
-/// outside the field and all boxes.
+/// Immutable, so avatars and threads may share it. Queries never allocate, and their results have
+/// the same bits on every machine. They find nearby boxes in a uniform grid. A position that is not
+/// finite is outside the field and all boxes.
 class Terrain {
  public:
   /// Validates `data` and builds the spatial index.
