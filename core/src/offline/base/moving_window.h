@@ -4,7 +4,7 @@
 
 namespace stridewire {
 
-/// Returns, for each value, the maximum of it, the `half` values before and the `half` after it.
+/// Returns, for each value, the maximum of this value and of the `half` values before and after it.
 [[nodiscard]] std::vector<double> MovingMaximum(const std::vector<double>& values, int half);
 
 /// Returns, for each value, the weighted mean of it and its neighbours. `weights` has an odd size,

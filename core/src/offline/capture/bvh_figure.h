@@ -12,7 +12,8 @@
 
 namespace stridewire {
 
-/// Number of frames that are sampled to determine the directions and the shape of a figure.
+/// At least this number of frames is sampled to determine the directions and the shape of a figure,
+/// or every frame if there are fewer.
 inline constexpr int kSampledFrames = 64;
 
 /// A joint below the root whose position channels are replaced with their mean.
@@ -31,8 +32,8 @@ struct BvhFigure {
   Clip clip;                        ///< Local rotations; its root positions are not set.
   std::vector<DVec3> roots;         ///< Root position in each frame.
   FoundLegs legs;
-  /// Product of the constant rotations of the joints above the root. It applies to the rest pose of
-  /// the file as well.
+  /// Product of the constant rotations of the joints above the root. FindFigureAxes determines
+  /// whether the rest pose stands upright with or without this rotation.
   DQuat fixed_turn = DQuat(1.0, 0.0, 0.0, 0.0);
   int first_frame = 0;  ///< Number of frames at the start that contain an artificial rest pose.
   std::vector<AveragedJoint> averaged;
@@ -49,8 +50,8 @@ struct BvhFigure {
 };
 
 /// Selects the figure of a file by its legs and merges the joints above its root into the root. The
-/// result does not contain other figures, props, and joints above the root that carry no part of
-/// the body. Releases the values of `file`. `fps` is the frame rate of the motion.
+/// result contains neither other figures nor branches above the root that are no part of the body,
+/// such as cameras. Releases the values of `file`. `fps` is the frame rate of the motion.
 ///
 /// Errors: those of FindLegs, with `name` in Error::where. kInvalidArgument or kNotFound for an
 /// option, with its name in Error::where.

@@ -27,7 +27,8 @@ class BvhMotion {
   [[nodiscard]] double Deviation(int joint, int first_frame, const DVec3& mean) const;
 
   /// Returns the shape of the joints in [begin, end), which belong to one root. The result numbers
-  /// them from 0. The offset of a joint with positions is their mean.
+  /// them from 0. The offset of a joint with position channels is the mean of its positions. At
+  /// least `sampled_frames` poses are sampled, or every frame if there are fewer.
   [[nodiscard]] FigureShape ShapeOf(int begin, int end, int sampled_frames) const;
 
  private:

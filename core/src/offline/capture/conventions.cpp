@@ -16,9 +16,9 @@ bool HasClearUp(const FileConventions& file) {
   return file.up_source == UpSource::kOption || file.up_source == UpSource::kRestPose;
 }
 
-// Returns the up axis that most files with the joint names of `of` have. Files whose rest pose
-// determines the axis take precedence over files whose motion determines it. Earlier files win
-// ties.
+// Returns the up axis that most files with the joint names of `of` have. Files whose axis was
+// determined by an option or the rest pose take precedence over those whose motion determined it,
+// and these over files whose axis was guessed. Earlier files win ties.
 BvhAxis UpOfMost(std::span<const FileConventions> files, const FileConventions& of) {
   BvhAxis best = of.up;
   double best_votes = 0.0;

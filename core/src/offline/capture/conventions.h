@@ -16,7 +16,7 @@ struct FileConventions {
   UpSource up_source = UpSource::kOption;
   double unit_m = 1.0;
   bool unit_is_common = true;  ///< False: the unit was estimated from the legs.
-  double leg_m = 0.0;          ///< Length of the legs.
+  double leg_m = 0.0;          ///< Length of thigh plus shank, averaged over both legs.
   std::vector<std::string> joint_names;
 };
 
@@ -32,9 +32,10 @@ struct AgreedConventions {
 /// Compares the files of one build and returns one element per file. `files` contains the files
 /// that could be read.
 ///
-/// - Files with the same joint names get the same up axis. If the rest pose of a file does not
-///   determine the axis, the file gets the axis of most other files. Files whose rest pose
-///   determines it take precedence.
+/// - A file keeps its up axis if an option or its rest pose determined the axis. Any other file
+///   gets the axis that most files with the same joint names have. In this vote, files whose axis
+///   was determined by an option or the rest pose take precedence over those whose motion
+///   determined it, and these over files whose axis was guessed.
 /// - A file whose unit was estimated gets the unit of a file with the same joint names and a common
 ///   unit, if its legs are then between 0.5 and 1.2 m long.
 /// - Notes state which axis or unit a file got from other files. They also list the files that

@@ -34,8 +34,8 @@ constexpr double kTravelRatio = 2.0;
 // A figure on a level floor moves less than this along the up axis.
 constexpr double kMaxRise = 0.3;
 // Used by RestUpInWorld if no floor determines the up axis. The fixed rotation of the joints above
-// the root is then applied to the up axis of the rest pose only if the cosine of its angle with the
-// mean direction from the feet to the hips increases by at least this much.
+// the root is then applied to the up axis of the rest pose only if it increases the cosine of the
+// angle between this axis and the mean direction from the feet to the hips by at least this much.
 constexpr double kClearGain = 0.5;
 // If the sum of the two unit foot vectors is shorter than this, the feet have no common direction.
 constexpr double kClearFeet = 0.5;

@@ -24,8 +24,8 @@ struct FigureAxes {
 
 /// Determines the axes of a figure. The up axis is `up` if it is set. Otherwise there are two
 /// estimates: the up axis of a standing rest pose, and the mean direction from the feet to the hips
-/// over the motion. If they differ, the rest pose decides unless the figure clearly stands and
-/// moves along the other axis.
+/// over the motion. If they differ, the rest pose decides unless the figure clearly stands along
+/// the other axis in the motion.
 ///
 /// If joint names do not contain the sides of the legs, the function determines the sides from the
 /// direction of the feet, and swaps the legs of `figure` if necessary. It adds notes to `figure`.

@@ -100,8 +100,8 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
 }
 
 // Repairs single frames in which the root leaves its path. The motion capture software sometimes
-// attributes motion of the root to another joint (16_17: for one frame, the pelvis moves by 4 cm
-// and turns by 30 degrees).
+// attributes motion of the root to another joint. In take 16_17, for example, the pelvis moves by 4
+// cm and turns by 30 degrees for one frame.
 void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
   std::vector<Vec3>& path = clip.root_positions_m;
   const int end = clip.frame_count();

@@ -16,9 +16,9 @@ namespace stridewire {
 /// acceleration exceeds a limit in more than 1 % of the frames.
 ///
 /// - Fingers, thumbs and toes: the limit is 1000 rad/s^2. Their rotations are derived from markers
-///   that are only a few centimetres apart. A median over 67 ms removes flips. A Gaussian mean then
-///   halves the amplitude of vibrations at 7.5 Hz.
-/// - Ankles: the limit is 2000 rad/s^2. The Gaussian mean halves the amplitude at 19 Hz.
+///   that are only a few centimetres apart. A median over 67 ms removes flips. A Gaussian filter
+///   then halves the amplitude of vibrations at 7.5 Hz.
+/// - Ankles: the limit is 2000 rad/s^2. A Gaussian filter halves the amplitude at 19 Hz.
 ///
 /// Frames before `first_frame` remain unchanged. Returns the joints that were filtered, in order.
 std::vector<int> RemoveJointNoise(const Skeleton& skeleton, int first_frame, Clip& clip);

@@ -10,11 +10,12 @@ namespace stridewire {
 [[nodiscard]] double ChainLength(const std::vector<Joint>& joints, int top, int joint);
 
 /// Finds hip and knee in a chain of at least three joints that ends with the ankle, and the toe
-/// joint below it.
+/// joint below the ankle.
 [[nodiscard]] FoundLeg FindLegAboveAnkle(const FigureShape& figure, const std::vector<int>& chain);
 
-/// Finds a leg in a chain of at least three joints that may end with the ankle or with toes. Thigh
-/// and shin are the longest pair of successive segments.
+/// Finds a leg in a chain of at least three joints that may end with the ankle or with toes. Joints
+/// that bend divide the chain into segments. Thigh and shin are the two successive segments with
+/// the largest total length.
 [[nodiscard]] FoundLeg FindLegInChain(const FigureShape& figure, const std::vector<int>& chain);
 
 }  // namespace stridewire

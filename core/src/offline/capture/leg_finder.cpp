@@ -59,7 +59,7 @@ struct LimbPair {
 std::vector<LimbPair> FindLimbPairs(const FigureShape& figure) {
   const std::vector<Joint>& joints = figure.joints;
   const int count = static_cast<int>(joints.size());
-  // Longest chain of bones below each joint, without its own offset.
+  // Length of the longest chain of bones below each joint, without the joint's own offset.
   std::vector<double> reach(joints.size(), 0.0);
   std::vector<int> next(joints.size(), -1);
   for (int j = count - 1; j > 0; --j) {

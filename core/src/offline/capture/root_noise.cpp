@@ -37,7 +37,7 @@ Vec3 SmallRotation(const Quat& a, const Quat& b) {
   return (turn.w < 0.0f ? -2.0f : 2.0f) * Vec3(turn.x, turn.y, turn.z);
 }
 
-// Gaussian means of a series of values, whose window ends at two standard deviations.
+// A Gaussian filter for a series of values, truncated at two standard deviations.
 class GaussianMean {
  public:
   GaussianMean(double fps, int count) : count_(count) {

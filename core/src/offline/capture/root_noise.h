@@ -11,7 +11,7 @@ namespace stridewire {
 /// avatar, the pelvis would shake visibly, especially where steps are played faster.
 ///
 /// The root is filtered if its angular acceleration exceeds 600 rad/s^2, or its acceleration 90
-/// m/s^2, in more than 10 % of the frames. A Gaussian mean halves the amplitude at 12 Hz.
+/// m/s^2, in more than 10 % of the frames. A Gaussian filter halves the amplitude at 12 Hz.
 ///
 /// - The world positions of the ankles are filtered in the same way. The feet keep their world
 ///   rotations, and each knee bends in the plane of its leg.
