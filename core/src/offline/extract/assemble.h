@@ -18,7 +18,8 @@ struct AssembleOptions {
   bool mirror = false;  ///< True: also add the mirror image of every step, for the other foot.
   bool unsettled_jumps = true;  ///< True: keep jumps after which the figure continues to move.
   /// A group gets a parameter only if its examples cover at least this range. With four or more
-  /// examples, the lowest and the highest value are ignored, because they may be outliers.
+  /// examples, the lowest and the highest value are ignored, because they may be outliers. For
+  /// heights, no value is ignored, and the range always includes 0.
   double spread_min_m = 0.05;
   double spread_min_rad = 0.0873;  ///< The same for parameters that are angles; 5 degrees.
   ExtractOptions extract;          ///< Options of the extraction. The assembler sets `target`.
@@ -33,11 +34,11 @@ struct AssembleOptions {
 ///     with those other parameters of a general step that vary
 ///   jump: length, and height and turn if they vary
 ///
-/// Besides start_z, end_z, length and the heights, a group has at most one parameter per three
-/// examples. Heights that vary are always parameters. If there are too few examples for that, the
-/// general group is omitted, and only jumps to one height are kept. Otherwise, blends of climbing
-/// and level examples would sink into level ground. A group without the turn parameter contains no
-/// steps with sharp turns, unless all its steps have them.
+/// A group has at most one parameter per three examples. However, start_z, end_z, length and
+/// heights that vary are always parameters, even if they exceed that number. If there are too few
+/// examples even for the heights, the general group is omitted, and only jumps to one height are
+/// kept. Otherwise, blends of climbing and level examples would sink into level ground. A group
+/// without the turn parameter contains no steps with sharp turns, unless all its steps have them.
 ///
 /// A group without examples of its own is omitted. Straight or level groups with fewer than three
 /// steps cannot span an area of parameters. They are omitted if another group contains their steps.

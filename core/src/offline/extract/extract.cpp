@@ -26,7 +26,7 @@ namespace stridewire {
 namespace {
 
 constexpr double kStandingYawS = 0.2;
-// Jumps that turn by less than this count as jumps straight ahead.
+// Jumps that turn by at most this (20 degrees) count as jumps straight ahead.
 constexpr double kJumpStraightMaxRad = 0.35;
 
 double HeadingBetween(const DVec3& from, const DVec3& to) {

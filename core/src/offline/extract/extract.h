@@ -17,7 +17,8 @@ struct ExtractOptions {
   ContactOptions contacts;
   SegmentOptions segments;
   // A step is straight if it is within the following four limits.
-  double straight_turn_max_rad = 0.0698;  ///< Limit on the turn of the stride heading; 4 degrees.
+  /// Limit on the change of the heading (StrideHeading); 4 degrees.
+  double straight_turn_max_rad = 0.0698;
   /// Limit on the angle between the motion of the feet and the heading; 15 degrees. Steps with a
   /// larger angle lead sideways or backward.
   double straight_drift_max_rad = 0.262;
@@ -26,8 +27,8 @@ struct ExtractOptions {
   /// Limit on the sideways distance from the fixed to the moving foot, positive towards the moving
   /// foot's side.
   double straight_side_max_m = 0.3;
-  /// If the centre of the feet moves farther than this, the heading is the direction of that
-  /// motion, which is more accurate than the direction of the pelvis.
+  /// If the centre of the feet moves farther than this in a straight step or jump, the heading is
+  /// the direction of that motion, which is more accurate than the direction of the pelvis.
   double displacement_heading_min_m = 0.3;
   /// True: the root of a figure that walks on the spot is moved so that its supporting foot stands
   /// still. False: such captures are rejected.
@@ -90,13 +91,13 @@ struct Extraction {
   bool has_contacts = false;
 
   struct Stand {
-    /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
+    /// Standing pose. The root is at x = z = 0 with heading 0, and y is its height above the
+    /// ground.
     Pose pose;
     /// Deviation from standing still and upright: the mean speed of the joints in m/s, plus
-    /// penalties for feet that are apart or tilted, for crouching and for leaning.
+    /// penalties for feet that are tilted or not side by side, for crouching and for leaning.
     double unrest = 0.0;
-    /// Sum of the height differences between the points of the feet and those of flat feet.
-    double tilt_m = 0.0;
+    double tilt_m = 0.0;  ///< See RawLibrary::stand_tilt_m.
   };
   std::optional<Stand> stand;  ///< The stillest moment with both feet on the same ground.
 };
@@ -116,12 +117,15 @@ void MeasureStepParameters(const Skeleton& skeleton, std::span<const ParameterNa
 /// Finds the steps and standing jumps of a capture and cuts them out as examples, each relative to
 /// the base frame in which it starts.
 ///
-/// Steps keep the frame rate of the capture. Their keytimes are start, toe-off, heel-strike and
-/// end. They start in the stride heading of their first frame. Heights are relative to the ground
-/// under the fixed foot. The keytimes of jumps are start, lowest point, toe-off, landing, lowest
-/// point and end. Parameters are measured at the balls in the first and last pose (paper, Section
-/// 6). Straight steps and jumps keep one heading from start to end, so that sequences of them do
-/// not veer.
+/// Examples keep the frame rate of the capture. Parameters are measured at the balls in the first
+/// and last pose (paper, Section 6).
+///
+/// - The keytimes of steps are start, toe-off, heel-strike and end. General steps start in the
+///   stride heading of their first frame. Heights are relative to the ground under the fixed foot.
+/// - The keytimes of jumps are start, lowest point, toe-off, landing, lowest point and end. Heights
+///   are relative to the mean height of the ground under both feet at the start.
+/// - Straight steps, and jumps that turn by at most 20 degrees, keep one heading from start to end,
+///   so that sequences of them do not veer.
 ///
 /// Never fails. `rejected` lists unusable time spans, and `error` is set if the capture is
 /// unusable. If nothing is found, `rejected` or `no_movement_reason` contains the reason.

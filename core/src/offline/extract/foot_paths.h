@@ -20,10 +20,10 @@ struct FootPaths {
 
   std::array<std::vector<DVec3>, kPoints> position_m;
   std::array<std::vector<double>, kPoints> speed_m_s;
-  /// Usual height of each point above the ball while all points are at rest. In single stances the
-  /// heights differ from it by up to 5 cm.
+  /// Usual height of each point above the ball while all points are at rest. In individual stances,
+  /// the heights differ from this by up to 5 cm.
   std::array<double, kPoints> flat_height_m{};
-  /// [frame]: speed of the slowest point.
+  /// Speed of the slowest of the three points.
   std::vector<double> slowest_m_s;
 
   [[nodiscard]] double Height(std::size_t point, int frame) const {

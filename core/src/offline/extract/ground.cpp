@@ -36,8 +36,8 @@ double RightAboveLeft(const FootContacts& contacts) {
   return Median(std::move(differences));
 }
 
-// Returns the height of the resting balls. Chooses a level with many contacts that is close to y =
-// 0. Returns the usual height if there is no such level.
+// Returns the height of the resting balls above the ground. Chooses a level that has many contacts
+// and is close to the usual height above y = 0. Returns the usual height if there is no such level.
 double BallHeight(std::vector<double> heights) {
   std::ranges::sort(heights);
   const auto count = static_cast<double>(heights.size());

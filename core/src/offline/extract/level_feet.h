@@ -17,8 +17,9 @@ namespace stridewire {
 /// carry. The legs bend to absorb the remaining difference.
 class FeetLeveller {
  public:
-  /// `ball_height_m` [foot]: height at which the balls of standing feet rest. `hinges` [foot]: see
-  /// LegRig::Side::hinge. If planting does not support the legs, the leveller only shifts the root.
+  /// `any_pose` may be any pose of the skeleton. `ball_height_m` [foot]: height at which the balls
+  /// of standing feet rest. `hinges` [foot]: see LegRig::Side::hinge. If the legs do not support
+  /// planting, the leveller only shifts the roots of examples and does not change standing poses.
   FeetLeveller(const Skeleton& skeleton, ConstPoseSpan any_pose, const std::array<Vec3, 2>& hinges,
                const std::array<double, 2>& ball_height_m);
 

@@ -121,8 +121,8 @@ std::optional<std::vector<int>> PairByName(const Skeleton& skeleton) {
 constexpr double kNoPair = 1e9;
 constexpr double kShapeShare = 0.08;  // Relative tolerance for the lengths of a mirrored pair.
 constexpr double kShapeM = 0.01;      // Absolute tolerance, added to the relative one.
-// Maximum distance between two vectors of equal length, as a fraction of the length. The value
-// allows an angle of 60 degrees.
+// Maximum distance between a bone and the mirror image of its partner, as a fraction of the longer
+// one. For bones of equal length, the value allows an angle of 60 degrees.
 constexpr double kDirectionShare = 1.0;
 
 // Pairs joints by their bones in a pose; x = 0 is the plane of symmetry.

@@ -10,7 +10,9 @@ namespace stridewire {
 /// like the supporting foot, which stands still on it.
 struct GroundTravel {
   std::vector<DVec3> position_m;  ///< Horizontal path of the ground, one point per frame.
-  double length_m = 0.0;  ///< Length of those parts of the path that have the speed of a walk.
+  /// Length of the path, without the parts in which both feet are in the air or the ground moves at
+  /// 0.2 m/s or less.
+  double length_m = 0.0;
   /// Fraction of `length_m` over which the left foot is the supporting foot.
   double left_share = 0.0;
 };

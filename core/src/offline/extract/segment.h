@@ -20,7 +20,9 @@ struct SegmentOptions {
   double support_slide_max_m = 0.12;  ///< Maximum motion of the other foot's ball during a swing.
   double flight_min_s = 0.15;         ///< Minimum duration of the flight of a jump.
   double flight_max_s = 1.0;          ///< Maximum duration of the flight of a jump.
-  double feet_apart_max_s = 0.15;     ///< In a jump, both feet leave and land within this time.
+  /// In a jump, this is the maximum time between the moments at which the two feet leave the
+  /// ground, and also between those at which they land.
+  double feet_apart_max_s = 0.15;
   /// Steps that end less than this before the figure hangs by its arms are rejected.
   double reaching_s = 0.7;
   /// Steps that start less than this after the figure has stopped hanging are rejected.

@@ -28,9 +28,9 @@ struct LegDeviations {
 ///   foot. Skeletons have no heel joint, and even in captures their toe tips dip several
 ///   centimetres below the ground.
 /// - The height of a standing sole is that of the lowest of heel, ball and toe tip, so that a foot
-///   may roll over its heel and its toes. If `has_stand` is false, the stand pose is a moment in
+///   may roll over its heel and its toes. If `has_stand` is false, the stand pose is a pose in
 ///   mid-stride, in which heels and toes are not on the ground. In this case, a standing foot
-///   hovers only if its ball is never on the ground while it stands.
+///   hovers only if its ball is never on the ground while the foot stands.
 void SurveyLegs(const MotionLibrary& library, const Synthesis& synthesis, bool has_stand,
                 LegDeviations& deviations);
 

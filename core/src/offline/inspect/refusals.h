@@ -21,6 +21,7 @@ struct Refusal {
   Values got;
   double missed_m = 0.0;  ///< Distance between the requested and the actual result.
   /// Angle between their directions of travel or between their headings, whichever is larger.
+  /// Walks: angle between the headings. Stands: 0.
   double missed_rad = 0.0;
   /// A sentence without its subject, which is the movement: "did not arrive: ...".
   std::string reason;
@@ -31,13 +32,16 @@ struct Refusal {
 /// steps, jumps and stands that differ from the request by more than kMaxRequestErrorM or
 /// kMaxRequestErrorRad. These values are compared:
 ///
-/// - Steps with `at`: the footprint. Other steps: position of the moving foot relative to the fixed
-///   foot, in the heading after the step; direction of the moving foot's path; change of heading.
-/// - Jumps: motion of the base frame, in the heading at its start; change of heading.
-/// - Stands: relative position of the feet, compared with the stand pose.
+/// - Steps with `at`: position of the moving foot, without its height; direction of its path;
+///   heading after the step, compared with the heading of the footprint.
+/// - Other steps: position of the moving foot relative to the fixed foot and to the heading after
+///   the step; direction of the moving foot's path; change of heading.
+/// - Jumps: displacement of the base frame, relative to the heading before the jump; direction of
+///   this displacement; change of heading.
+/// - Stands: relative position of the feet, without heights, compared with the stand pose.
 ///
-/// Heights are compared only without a terrain, which would determine them, and not for steps with
-/// `at`.
+/// Directions are compared only if the position differs by more than 5 cm. Heights in other steps
+/// and in jumps are compared only without a terrain, because a terrain determines them.
 [[nodiscard]] std::vector<Refusal> FindRefusals(const SynthesisInput& input,
                                                 const Synthesis& synthesis);
 

@@ -290,7 +290,8 @@ class Checker {
     return true;
   }
 
-  // If the library has no steps, plays a jump of mean length to measure the legs.
+  // If no step was played but the library has jumps, plays a jump to measure the legs. Its length
+  // is the mean of the shortest and the longest one.
   void PlayJump() {
     if (legs_.feet > 0 || !summary_.jumps.is_available()) return;
     const double length_m = 0.5 * (summary_.jumps.range.min + summary_.jumps.range.max);

@@ -40,8 +40,10 @@ struct SelfCheck {
 
 /// Plays a few movements with a library, on level ground at 30 frames per second, and checks them:
 ///
-///   three_steps  Three steps of a comfortable length land within 0.2 m of their places.
-///   stop         A stand after these steps brings the feet together within 3 cm.
+///   three_steps  Three alternating steps of a comfortable length are possible without steps in
+///                between, and miss this length by at most 0.2 m.
+///   stop         A stand after these steps brings the feet together: measured forward, they are
+///                within 3 cm of their positions in the stand pose.
 ///   walk_to      A walk to a goal 3 m straight ahead arrives. If the library has no stop, the walk
 ///                ends within half a step of the goal.
 ///   knees        Knees bend forward: bent legs deviate at most 60 degrees from their feet.
