@@ -102,8 +102,8 @@ struct SynthesisInput {
   std::span<const MovementRequest> requests;
   double fps = 60.0;  ///< Ticks per second, 10 to 1000.
   AvatarOptions options;
-  /// Must be sorted by `before`. Each cue takes effect in the frame after its request has started
-  /// or has been skipped.
+  /// Must be sorted by `before`. Each cue takes effect in the frame after its request has started,
+  /// has been skipped or has failed.
   std::span<const LayerCue> layers;
 };
 

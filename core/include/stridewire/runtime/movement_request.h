@@ -95,10 +95,11 @@ enum class Interrupt : std::uint8_t {
   /// jump in progress continues to its landing. A stand waits for the end of a step that brings the
   /// feet together. The queue is dropped.
   ///
-  /// The current step changes if more than 40 % of its swing remains. If the request is a step of
-  /// the swinging foot, or a walk that begins with one, the foot is redirected to the new
-  /// footprint. For a stand or jump, the step is shortened. If possible, the shortened step brings
-  /// the feet together.
+  /// The current step can change while more than 40 % of its swing remains. If the request is a
+  /// step of the swinging foot, the foot is redirected to the new footprint. Requests of other
+  /// kinds change the step only if feet are planted: a walk that begins with a step of the swinging
+  /// foot redirects it, and for a stand or jump, the step is shortened. If possible, the shortened
+  /// step brings the feet together.
   kNow,
 };
 

@@ -33,7 +33,8 @@ struct JsonLimit {
   const char* text;
 };
 
-/// Checks that the field is an object whose keys are all in `known`.
+/// Checks that the field is an object whose keys are all in `known`. Otherwise, fails with
+/// kMalformed.
 [[nodiscard]] Status CheckKeys(const JsonField& field, std::initializer_list<const char*> known);
 
 /// Reads a number. Errors: kMalformed if the value is not a number, kOutOfRange if it is outside
@@ -45,7 +46,7 @@ struct JsonLimit {
 [[nodiscard]] Status ReadNumber(const JsonField& field, const char* key, const JsonLimit& limit,
                                 double& out);
 
-/// Reads a required number.
+/// Reads a required number. Fails with kMalformed if the key is absent.
 [[nodiscard]] Status ReadRequiredNumber(const JsonField& field, const char* key,
                                         const JsonLimit& limit, double& out);
 

@@ -22,10 +22,13 @@ inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;
 /// `height_field` and `boxes` are optional, but all keys inside them are required. Unknown and
 /// duplicate keys are errors.
 ///
-/// Errors: kNotFound or kIo, with the file in Error::where. The errors of ParseJson, with
-/// "file:line:column", if the text is not JSON or nested too deeply. For invalid values, kMalformed
-/// or the errors of Terrain::Make, with the field in Error::where, for example "t.json:
-/// boxes[3].max_m". kLimitExceeded if the file exceeds kMaxTerrainFileBytes.
+/// Errors, by what Error::where contains:
+///
+/// - The file: kNotFound or kIo if it cannot be read, kLimitExceeded if it exceeds
+///   kMaxTerrainFileBytes, and kMalformed if the JSON text is not an object.
+/// - "file:line:column": the errors of ParseJson.
+/// - A field, for example "t.json: boxes[3].max_m", if its value is invalid: kMalformed or the
+///   errors of Terrain::Make.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ReadTerrain(
     const std::filesystem::path& path);
 
