@@ -6,7 +6,7 @@
 
 namespace stridewire {
 
-/// Thresholds for ground contacts. They are for adults recorded in metres and were tuned on twelve
+/// Thresholds for ground contacts. They suit recordings of adults and were tuned on twelve
 /// captured walks. A maximum speed of 0.35 instead of 0.8 m/s, for example, would miss half of the
 /// steps.
 struct ContactOptions {
