@@ -15,7 +15,8 @@ namespace stridewire {
 
 /// Computes the feet of a movement, before planting, at several times at once. It evaluates only
 /// the joints of the legs, with SIMD and one time per lane. The results have the same bits as those
-/// of EvaluateMovement or EvaluateBlend followed by FootOf.
+/// of EvaluateMovement or EvaluateBlend followed by FootOf. Getters take the index of a time in the
+/// last call of Sample.
 class FootSampler {
  public:
   static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Maximum number of times per call.
@@ -25,8 +26,9 @@ class FootSampler {
   FootSampler(FootPlanScratch& scratch, PoseSpan pose)
       : library_(scratch.library()), scratch_(scratch), pose_(pose) {}
 
-  /// Sets the difference pose for Sample. All samplers that use this scratch memory share it. Call
-  /// it again when the difference pose has changed.
+  /// Copies the difference pose of a movement to the scratch memory, for Sample. All samplers that
+  /// use this scratch memory share the copy. Call SetDifference again when the difference pose has
+  /// changed.
   void SetDifference(const Movement& movement);
 
   /// Samples a movement at up to kMaxTimes times: the first `eased` of them with the difference
@@ -47,7 +49,8 @@ class FootSampler {
   /// Returns the smaller of two heights at time `i`, in world space: those of the ball and of the
   /// ankle, each minus its height above the ground in the stand pose.
   [[nodiscard]] double LowestFlatSole(std::size_t i, Foot foot) const;
-  /// Same as LowestFlatSole, for ball, ankle and toe tip.
+  /// Same as LowestFlatSole, for ball, ankle and toe tip. Unlike LowestSole, it has no allowance
+  /// for toes that bend.
   [[nodiscard]] double LowestPoint(std::size_t i, Foot foot) const;
 
  private:

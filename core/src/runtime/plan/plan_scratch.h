@@ -23,6 +23,7 @@ class FootPlanScratch {
   [[nodiscard]] const MotionLibrary& library() const { return *library_; }
   /// Cached rows of the movement that is being planned. Clear the cache when the movement changes.
   [[nodiscard]] GridCache& cache() { return *cache_; }
+  /// Arrays that FootSampler uses.
   [[nodiscard]] FootSamplerLanes& lanes() { return *lanes_; }
 
  private:

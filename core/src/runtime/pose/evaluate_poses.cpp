@@ -11,8 +11,8 @@
 namespace stridewire {
 namespace {
 
-// Limits on the speed of a difference pose. Human bodies do not move faster. The overshoot of a
-// blend is at most 4/27 of this speed times the duration of the blend.
+// Limits on the velocity of a difference pose. Human bodies do not move faster. The velocity adds
+// at most 4/27 of itself times the duration of the blend to the difference pose (EaseOutSlope).
 constexpr float kMaxJointRadPerS = 20.0f;
 constexpr float kMaxRootMPerS = 4.0f;
 
@@ -21,8 +21,9 @@ Vec3 NoFaster(const Vec3& velocity, float most) {
   return speed > most ? velocity * (most / speed) : velocity;
 }
 
-// Converts a small rotation to a rotation vector. The length is only approximately the angle (2
-// sin(angle / 2)), but needs no trigonometry, which would differ between machines.
+// Converts a small rotation to a rotation vector. The length of the vector is 2 sin(angle / 2),
+// which is close to the angle and needs no trigonometry of the C library, which differs between
+// machines.
 Vec3 RotationVector(const Quat& q) {
   const float sign = q.w < 0.0f ? -2.0f : 2.0f;
   return sign * Vec3(q.x, q.y, q.z);
@@ -62,8 +63,7 @@ void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const
 
 namespace {
 
-// The position of a pose in its movement, and the fraction of the difference pose that remains
-// there.
+// The position of a pose in its movement, and the difference pose and turn that remain there.
 struct PoseSample {
   GridSample grid;
   float fraction;  // Remaining fraction of the difference pose.
@@ -161,8 +161,9 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement) {
-  // The velocity requires the pose of the movement kBlendStepS before the blend begins. If there is
-  // none, the pose kBlendStepS later is reflected at the first pose.
+  // The velocity requires the pose of the movement kBlendStepS before the blend begins. If the
+  // movement has no such pose, the pose kBlendStepS after the beginning of the blend is reflected
+  // at the pose at its beginning.
   const bool is_reflected = movement.start_offset_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
                 movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache,

@@ -12,8 +12,9 @@
 namespace stridewire {
 
 /// Caches the weighted sums of the examples of a movement at grid points. A sum over n examples
-/// costs n multiply-adds per number, whereas poses between grid points are only interpolated.
-/// Results do not depend on the state of the cache. It takes 17 KB and never allocates.
+/// costs n multiply-adds per number, whereas a pose between grid points is interpolated from only
+/// four such sums. Results do not depend on the state of the cache. A cache takes 17 KB and never
+/// allocates.
 class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
@@ -51,7 +52,8 @@ class GridCache {
   std::array<int, kMaxSlots> points_;    // [slot]: grid point stored in the slot, or -1.
 };
 
-/// Evaluates the blended pose at a grid point. Never allocates.
+/// Evaluates the blended pose at a grid point in world space, without the difference pose and
+/// without Movement::extra_turn_rad. Never allocates.
 void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                        int point, GridCache& cache, PoseSpan out);
 
@@ -72,9 +74,10 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 /// Time in seconds between the two poses from which a velocity is measured.
 inline constexpr double kBlendStepS = 0.004;
 
-/// Sets the velocity of a movement's difference pose. `before` is the pose of the previous movement
-/// at the start of this one, and `earlier` is its pose kBlendStepS before that. `scratch` has one
-/// rotation per joint. Does not allocate if the velocity has room for all joints.
+/// Sets Movement::difference_velocity and Movement::is_inertial. The difference pose must be set.
+/// `before` is the pose of the previous movement at the start of this one, and `earlier` is the
+/// pose of the previous movement kBlendStepS before that. `scratch` has one rotation per joint.
+/// Does not allocate if the velocity has room for all joints.
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement);

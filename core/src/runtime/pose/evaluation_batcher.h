@@ -10,16 +10,18 @@
 
 namespace stridewire {
 
-/// Returns how many poses, 1 to `most`, fit before the end of a movement. The first pose is at
-/// `time_s`, and poses are `ticks_apart` ticks of `step_s` seconds apart.
+/// Returns the number of poses that are not later than the end of a movement, clamped to 1 to
+/// `most`. The first pose is at `time_s`, and poses are `ticks_apart` ticks of `step_s` seconds
+/// apart.
 [[nodiscard]] int SampleRunCount(const Movement& movement, double time_s, double step_s,
                                  int ticks_apart, int most);
 
 /// Collects sample runs of different lengths and evaluates similar runs side by side.
 ///
-/// Runs are similar if all or none have planted feet, and if they have the same length, the same
-/// group and about the same time within the group. Similar runs read the same parts of the library
-/// and fade out their difference poses together. The batcher keeps its memory between evaluations.
+/// Runs are similar if all or none have planted feet, if they have the same length and the same
+/// group, and if they begin at about the same fraction of their movements. Similar runs read the
+/// same parts of the library, and their difference poses fade out at about the same time. The
+/// batcher keeps its memory between evaluations.
 class EvaluationBatcher {
  public:
   /// Maximum number of poses per run.
@@ -57,8 +59,8 @@ class EvaluationBatcher {
   /// Evaluates all added runs in blocks of up to SoaPose::kLanes and then removes them. For each
   /// pose index of a block it calls
   ///   use(std::span<const Item> items, int pose, const SoaPose& poses)
-  /// Lane i of `poses` holds the pose with index `pose` of items[i]. If `pose` is not less than
-  /// items[i].count, lane i is undefined.
+  /// Lane i of `poses` contains the pose with index `pose` of items[i]. If items[i] has no such
+  /// pose (`pose` >= items[i].count), lane i is undefined.
   template <typename Use>
   void Evaluate(SoaPoseEvaluator& evaluator, Use&& use) {
     Sort();

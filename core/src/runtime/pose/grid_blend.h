@@ -64,8 +64,9 @@ inline void BlendRow(const MotionGroup& group, const GridLayout& layout, const M
                        static_cast<std::size_t>(layout.row_floats), row);
 }
 
-/// If the examples' rotations of a joint cancel each other out, they have no mean. Replaces such
-/// rotations of a blended row with those of the example with the largest weight.
+/// Replaces rotations of a blended row that are shorter than kernels::kSmallestNorm with those of
+/// the example with the largest weight. The examples' rotations of these joints cancel each other
+/// out and have no mean.
 void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                        const GridSample& sample, float* row);
 

@@ -127,7 +127,8 @@ void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
 }
 
 Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing> playing) {
-  // Limit on the time in a clip. The longest clip takes ten minutes, which is far below this.
+  // Limit on times in seconds. It is far above the duration of the longest clip, 18,000 s
+  // (kMaxLayerFrames at kMinLayerFps).
   constexpr double kLongestS = 1e6;
   const auto is_valid = [&](const Playing& p) {
     const auto is_fraction = [](double value) { return IsWithin(value, 0.0, 1.0); };

@@ -13,8 +13,9 @@ namespace stridewire {
 class MotionLibrary;
 
 /// The layers that one avatar plays. Weights ease in and out with continuous derivatives, even if a
-/// request interrupts another one. Later layers are applied on top of earlier ones. The first layer
-/// that is set or restored allocates, unless Reserve was called.
+/// request interrupts another one. With a blend time of 0, weights jump. Later layers are applied
+/// on top of earlier ones. The first layer that is set or restored allocates, unless Reserve was
+/// called.
 class LayerStack {
  public:
   /// Maximum number of layers that play at the same time, including those that ease out.
@@ -45,7 +46,8 @@ class LayerStack {
   /// time. Ending a layer that is not playing has no effect.
   ///
   /// Errors: kNotFound if there is no such layer. kOutOfRange if a number is not finite or out of
-  /// its range. kLimitExceeded if kMaxLayers are playing. On error nothing changes.
+  /// its range. kLimitExceeded if another layer would have to start while kMaxLayers are playing.
+  /// On error nothing changes.
   [[nodiscard]] Status Set(const MotionLibrary& library, const LayerRequest& request);
 
   /// Advances all layers by `dt_s`. Non-looping clips ease out before their end.

@@ -34,8 +34,8 @@ T AddBoth(const T& base, const T& a, const T& b) {
 #undef STRIDEWIRE_INLINE
 
 // Returns the time over which planting distributes changes of the root: the duration of the
-// movement. If both feet stand throughout, the root moves while the difference pose fades out
-// instead.
+// movement. If both feet stand throughout, the time is such that the vertical residual of the root
+// fades out together with the difference pose (kRootRisePart).
 double SpreadTime(const Movement& movement) {
   const auto& feet = movement.feet.feet;
   const bool stands =

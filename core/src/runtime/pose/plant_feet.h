@@ -8,10 +8,11 @@
 
 namespace stridewire {
 
-/// Time over which the residual of the root (FootPlan::root_residual_m) fades out, in seconds.
+/// Minimum time over which the residual of the root (FootPlan::root_residual_m) fades out, in
+/// seconds. The horizontal residual fades out over RootApproach::over_s if that is longer.
 inline constexpr double kRootShiftS = 0.25;
-/// The vertical residual fades out over this fraction of the movement, if that is longer than
-/// kRootShiftS, because a body rises for as long as its leg extends.
+/// The vertical residual of the root fades out over this fraction of the movement, if that is
+/// longer than kRootShiftS, because a body rises for as long as its leg extends.
 inline constexpr double kRootRisePart = 0.75;
 
 /// A foot in the blended pose, before planting.
@@ -26,11 +27,12 @@ using FeetAt = std::array<BlendedFoot, 2>;
 
 /// Correction of one foot at one time.
 struct FootCorrection {
-  DVec3 offset_m = DVec3(0.0);
-  double turn_rad = 0.0;       ///< Turn that is added to the heading of the blended foot.
-  double free_turn_rad = 0.0;  ///< Turn that the foot would have without the heading lock.
-  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
-  double root_weight = 0.0;
+  DVec3 offset_m = DVec3(0.0);  ///< Offset that is added to the blended ball.
+  double turn_rad = 0.0;        ///< Turn that is added to the heading of the blended foot.
+  double free_turn_rad = 0.0;   ///< Turn that the foot would have without the heading lock.
+  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Normal of the plane to which the foot tilts.
+  double root_weight = 0.0;              ///< FootTrajectory::root_weight
+  /// Part of FootTrajectory::root_shift_m that is complete at this time.
   DVec3 root_shift_m = DVec3(0.0);
 };
 
@@ -42,7 +44,8 @@ struct FootCorrection {
 /// of the difference pose has faded out.
 [[nodiscard]] double SettleLiftShare(double settled);
 
-/// Returns the fraction of FootTrajectory::lift_m[lift] that is added at a fraction of the swing.
+/// Returns the fraction of FootTrajectory::lift_m[lift] that is added when the fraction `swing` of
+/// the swing has elapsed.
 [[nodiscard]] double LiftShare(std::size_t lift, double swing);
 
 /// Returns the rotation of a corrected foot about its ball, in world axes.
@@ -63,17 +66,20 @@ struct FeetCorrection {
   /// Shift of the root, before it is lowered for legs that are too short.
   DVec3 root_m = DVec3(0.0);
 };
+/// Returns the corrections at `time_s`. `blended` are the feet at that time.
 [[nodiscard]] FeetCorrection CorrectFeet(const Movement& movement, double time_s,
                                          const FeetAt& blended);
+/// Same, for the feet of the blended pose `pose`.
 [[nodiscard]] FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig,
                                          const Movement& movement, double time_s,
                                          ConstPoseSpan pose);
 
 /// Sets the residuals of a movement's plan so that the corrections continue smoothly. `before`
 /// contains the corrections of the previous movement at the start of this one, and kBlendStepS
-/// earlier. `planned` contains those of the plan at the start, and kBlendStepS later. `blended`
-/// contains the feet without corrections at those times. Two equal elements mean zero velocity. A
-/// foot on the ground continues to descend at 0.5 m/s at most.
+/// earlier. `planned` contains the corrections of the new plan without residuals at the start, and
+/// kBlendStepS later. `blended` contains the feet without corrections at the times of `planned`. If
+/// both elements of an array are equal, the velocity is zero. A standing foot continues to descend
+/// at 0.5 m/s at most.
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned,
                   const std::array<FeetAt, 2>& blended, Movement& movement);
@@ -93,10 +99,11 @@ void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, 
 /// Packs a movement's plan for FootPlan::packed.
 [[nodiscard]] PackedFootPlan PackFootPlan(const Movement& movement);
 
-/// Plants the feet of a blended pose with its difference pose. Shifts the root by the weighted
-/// corrections of the feet, lowers it until both legs reach their targets, and bends the legs
-/// accordingly. Raises the heels of feet whose ankles would bend too far. Never allocates. Gives
-/// the same bytes on every machine.
+/// Plants the feet of `pose`, which is the result of EvaluateMovement at `time_s`. Does nothing if
+/// the movement's feet are not planted. Shifts the root by the weighted corrections of the feet,
+/// lowers it until both legs reach their targets, and bends the legs accordingly. Raises the heels
+/// of feet whose ankles would bend too far. Never allocates. The result has the same bits on every
+/// machine.
 void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
 }  // namespace stridewire

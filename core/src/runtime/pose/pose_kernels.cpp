@@ -193,7 +193,7 @@ void BlendLayer(const LayerBlend& layer, float* rotations) {
         Normalise(Closer(key(0), second) * Float(layer.key_weights[0]) +
                   second * Float(layer.key_weights[1]) + third * Float(layer.key_weights[2]) +
                   Closer(key(3), third) * Float(layer.key_weights[3]));
-    // Lanes beyond the last joint repeat it and are not stored.
+    // Lanes beyond the last joint read that joint again and are not stored.
     const auto rotation_of = [&](std::size_t lane) HWY_ATTR {
       const std::size_t joint = i + lane < layer.joint_count ? i + lane : layer.joint_count - 1;
       return rotations + 4 * static_cast<std::size_t>(layer.joints[joint]);

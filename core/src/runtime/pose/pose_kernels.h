@@ -7,57 +7,62 @@
 
 namespace stridewire::kernels {
 
-/// The inner loops of evaluation. They are written once for vectors of any width (Google Highway)
-/// and compiled for each instruction set; the program chooses one at run time. They use no fused
-/// multiply-add, no approximate instructions and no sums across lanes, so that every instruction
-/// set produces the same bytes (docs/decisions/0002, 0017).
+/// The inner loops of pose evaluation. They are written once for vectors of any width (Google
+/// Highway) and compiled for each instruction set; the program chooses one at run time. They use no
+/// fused multiply-add, no approximate instructions and no sums across lanes, so that every
+/// instruction set produces the same bytes (docs/decisions/0002, 0017).
 ///
-/// Poses of up to kBlock movements are processed side by side, one movement per lane. An array
-/// [n][kBlock] holds n numbers per lane. Unused lanes are read, but their content does not matter.
+/// Most kernels process poses of up to kBlock movements side by side, one movement per lane. An
+/// array [n][kBlock] contains n numbers per lane. Unused lanes are read, but their content does not
+/// matter.
 
-/// Maximum number of movements per block. Rows have a multiple of this many floats.
+/// Maximum number of movements per block. The length of grid rows (GridLayout::row_floats) is a
+/// multiple of this number.
 inline constexpr std::size_t kBlock = 16;
 
-/// Computes the weighted sum of the rows of `count` examples, which are summed in order:
-/// row[i] = sum of weights[e] * examples[e * row_floats + i].
+/// Computes the weighted sum of the rows of `count` examples:
+/// row[i] = sum of weights[e] * examples[e * row_floats + i], added in the order of e.
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
              float* row);
 
-/// Computes the weighted sum of four rows, which are summed in order: row[i] = sum of weights[k] *
-/// points[k][i].
+/// Computes the weighted sum of four rows: row[i] = sum of weights[k] * points[k][i], added in the
+/// order of k.
 void BlendPoints(const float* const points[4], const float weights[4], std::size_t row_floats,
                  float* row);
 
-/// A time of each movement of a block, one per lane, and the piece of its time warp.
+/// For each lane: a time of its movement, and the piece of the movement's time warp at this time.
 struct GridTimes {
   alignas(64) double time_s[kBlock];
   alignas(64) double begin_s[kBlock], end_s[kBlock];  ///< TimeWarp::Piece
   alignas(64) double begin[kBlock], end[kBlock];
   alignas(64) double begin_slope[kBlock], end_slope[kBlock];
-  alignas(64) double last_cell[kBlock];  ///< Number of grid points minus 2
+  alignas(64) double last_cell[kBlock];  ///< Index of the last cell: number of grid points - 2
   /// Copies of the members of Movement that have these names.
   alignas(64) double duration_s[kBlock], start_offset_s[kBlock], ease_out_s[kBlock];
 };
-/// Values that depend only on the times of the poses: weights of grid points, and the remaining
-/// fractions of turns and difference poses.
+/// Values at the times in GridTimes, one per lane: weights of grid points, and remaining fractions
+/// of extra turns and difference poses.
 struct GridSamples {
   alignas(64) std::int32_t first_point[kBlock];  ///< First of the four points to interpolate
   /// Weights of these points; 0 beyond the last point
   alignas(64) float weights[4][kBlock];
-  alignas(64) double remaining_turn[kBlock];  ///< Fraction of the extra turn still to come
+  /// Fraction of Movement::extra_turn_rad that is still to come
+  alignas(64) double remaining_turn[kBlock];
   /// 1 while part of the difference pose remains, otherwise 0.
   alignas(64) float is_eased[kBlock];
-  alignas(64) float fraction[kBlock];  ///< EaseOut of the elapsed fraction of the ease-out
-  alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of that fraction, times ease_out_s
+  /// Remaining fraction of the difference pose: EaseOut of the elapsed fraction of the ease-out
+  alignas(64) float fraction[kBlock];
+  /// EaseOutSlope of the same elapsed fraction, times ease_out_s
+  alignas(64) float slope_s[kBlock];
 };
-/// Computes the samples for `count` times: Catmull-Rom weights of the four grid points around the
-/// position that the time warp determines. Points beyond the ends of the grid are extrapolated
-/// quadratically. Uses doubles and the operations of TimeWarp::GridPosition and EaseOut, in the
-/// same order.
+/// Computes the samples for `count` times. The weights are Catmull-Rom weights of the four grid
+/// points around the position that the time warp determines. Points beyond the ends of the grid are
+/// extrapolated quadratically. Uses doubles and performs the operations of TimeWarp::GridPosition,
+/// CellWeightsAt and EaseOut in the same order, so that the results have the same bits.
 void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples);
 
-/// A job that blends the poses of several movements of one group: those in the lanes from `lane`
-/// on.
+/// Input and output of BlendRows, which blends the poses of several movements of one group. The
+/// movements are in `lanes` successive lanes, beginning with `lane`.
 struct BlendRowsJob {
   const float* grid;  ///< [point][example][row_floats]
   std::size_t examples;
@@ -72,8 +77,9 @@ struct BlendRowsJob {
   float* rows;                  ///< Output: [pose][kBlock][row_floats]
 };
 
-/// Blends the rows of all poses: SumRows for each grid point, then BlendPoints for each pose.
-/// Movements that need the same grid point read it from the library once.
+/// Blends the rows of all poses: SumRows for each grid point, then BlendPoints for each pose. Two
+/// movements at a time read the rows of a grid point that both need, so the library is read less
+/// often.
 void BlendRows(const BlendRowsJob& run);
 
 /// Rotations of a blended row and the difference pose that is added to them.
@@ -85,17 +91,19 @@ struct RotationBlend {
   float fraction;
   /// [joint] x y z: velocity of the difference pose as rotation vectors per second, or null.
   const float* velocity;
-  /// Time by which the velocity is multiplied: r := r * (rotation by the vector seconds *
-  /// velocity).
+  /// Time by which the velocity is multiplied: r := r q, where q is approximately the rotation by
+  /// the rotation vector seconds * velocity.
   float seconds;
 };
 
-/// Writes the unit rotations to out[joint] x y z w. Returns false if a rotation of the row is
-/// shorter than kSmallestNorm. In this case, the examples' rotations cancel each other out and have
-/// no mean, and the output for that joint is undefined.
+/// Adds the difference pose to the rotations of the row, and writes the normalized results to
+/// out[joint] x y z w. Returns false if a rotation of the row is shorter than kSmallestNorm. In
+/// this case, the examples' rotations cancel each other out and have no mean, and the output for
+/// that joint is undefined.
 [[nodiscard]] bool BlendRotations(const RotationBlend& blend, float* out);
 
-/// A sum of rotations that is shorter than this has no usable direction.
+/// If a weighted sum of quaternions is shorter than this, it does not determine a rotation
+/// reliably.
 inline constexpr float kSmallestNorm = 0.1f;
 
 /// A layer that is blended over the rotations of some joints of a pose.
@@ -115,8 +123,8 @@ void BlendLayer(const LayerBlend& layer, float* rotations);
 /// Sin and Cos of base/trig.h.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);
 
-/// Transposes `count` floats per lane: to[i][lane] = from[lane][i]. `from` has kBlock entries, none
-/// of them null.
+/// Transposes `count` floats of each of the first `lanes` lanes: to[i][lane] = from[lane][i].
+/// `from` has kBlock entries, none of them null.
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to);
 
 /// Copies the rotations of `joint_count` joints from each lane to a separate array of quaternions:
@@ -131,8 +139,8 @@ inline constexpr std::size_t kDifferenceFloats = 4;
 /// it fades out: [joint][kDifferenceFloats][kBlock].
 void PrepareDifferences(const float* difference, std::size_t joint_count, std::size_t lanes,
                         float* ease);
-/// Sets fastest[lane] to the largest squared length of any vector in `velocity`, [joint][x y
-/// z][kBlock].
+/// Sets fastest[lane] to the largest squared length of the vectors of that lane in `velocity`,
+/// [joint][x y z][kBlock].
 void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::size_t lanes,
                            float* fastest);
 
@@ -150,6 +158,7 @@ struct FinishPosesJob {
   // Remaining difference poses. Unused if `ease` is null.
   const float* ease;  ///< Output of PrepareDifferences; null if no lane has a difference left
   /// [joint][x y z][kBlock]: velocity of the difference pose; null if no lane is inertial
+  /// (Movement::is_inertial)
   const float* velocity;
   const float* fastest;        ///< Output of FindLargestVelocities for `velocity`
   const float* root_ease_m;    ///< [x y z][kBlock]: difference of the root position

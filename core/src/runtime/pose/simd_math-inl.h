@@ -1,7 +1,8 @@
 // SIMD vectors, quaternions and trigonometry for the kernels. pose_kernels.cpp compiles this file
-// once per instruction set, so it has no ordinary include guard. It uses only additions,
-// multiplications, divisions, square roots and comparisons, each rounded separately, so that all
-// instruction sets produce the same bytes.
+// once per instruction set, so it has no ordinary include guard. It uses only operations that IEEE
+// 754 defines exactly (additions, multiplications, divisions, square roots, comparisons and
+// rounding to integers), each rounded separately, so that all instruction sets produce the same
+// bytes.
 #if defined(STRIDEWIRE_SIMD_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_SIMD_MATH_INL_H
 #undef STRIDEWIRE_SIMD_MATH_INL_H

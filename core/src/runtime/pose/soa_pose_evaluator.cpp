@@ -123,7 +123,7 @@ struct SoaPoseEvaluator::Work {
   Pose scratch;  // The pose of one lane, for ApplyPlantFade.
 };
 
-// Finds the position of each pose in its grid.
+// Computes the time of each pose and its GridSamples.
 void SoaPoseEvaluator::Work::SampleGrids() {
   kernels::GridTimes& t = grid_times;
   const auto take_piece = [&](std::size_t i) {

@@ -39,16 +39,17 @@ class SoaPoseEvaluator {
 
   [[nodiscard]] int max_count() const;
 
-  /// Starts the evaluation of `count` poses of each run. There must be at least one run. Either all
-  /// movements have planted feet or none. The movements must exist until the last pose has been
-  /// evaluated.
+  /// Starts the evaluation of `count` poses of each run, 1 to max_count(). There must be 1 to
+  /// SoaPose::kLanes runs, and either all or none of their movements have planted feet. The
+  /// movements must exist until the last pose has been evaluated.
   void Begin(std::span<const SampleRun> runs, int count);
-  /// Returns the next pose of each run, in the lane of the run. Other lanes are undefined.
+  /// Returns the next pose of each run; lane i contains the pose of runs[i]. Other lanes are
+  /// undefined. The result is valid until the next call. Call it at most `count` times per Begin.
   [[nodiscard]] const SoaPose& Next();
 
-  /// These functions prefetch memory that evaluation reads. PrefetchTimes: what SampleRunCount and
-  /// EvaluationBatcher::Add read. PrefetchMovement: the movement itself. Prefetch: the arrays to
-  /// which the movement points.
+  /// These functions prefetch memory that evaluation reads. PrefetchTimes: the members that
+  /// SampleRunCount and EvaluationBatcher::Add read. PrefetchMovement: the movement itself.
+  /// Prefetch: the arrays to which the movement points.
   static void PrefetchTimes(const Movement& movement);
   static void PrefetchMovement(const Movement& movement);
   static void Prefetch(const SampleRun& run);

@@ -41,12 +41,13 @@ inline constexpr double kSinkStart = 0.35;
 // The root of a body that steps down descends after this fraction of the movement. If it descended
 // earlier, it would bend the knee of the leg that swings above the higher tread.
 inline constexpr double kRootSinkStart = 0.25;
-// A foot tilts with the slope of the ground on which it stands. In the middle of a swing, it tilts
-// only by this fraction of the slope. Otherwise, the ankle of a bent leg would bend too far on
-// ramps.
+// A foot tilts with the slope of the ground on which it stands. From the middle of a swing until
+// kLandingTiltStart, it tilts only by this fraction of the slope. Otherwise, the ankle of a bent
+// leg would bend too far on ramps.
 inline constexpr double kSwingTilt = 0.4;
-// Fraction of the swing at which its tilt begins to change to that of the footprint. The toes of a
-// landing foot are already raised, so the slope of a ramp is added late.
+// Fraction of the swing from which the tilt of the foot increases again, from kSwingTilt to the
+// full slope at its footprint. The toes of a landing foot are already raised, so the slope of a
+// ramp is added late.
 inline constexpr double kLandingTiltStart = 0.75;
 // A curve that rises from 0 to 1 between `begin` and `top`, and falls back to 0 between `falls` and
 // `end`. All are fractions of the swing.

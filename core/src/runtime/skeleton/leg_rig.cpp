@@ -22,8 +22,8 @@ Quat ShortestArc(const Vec3& from, const Vec3& to) {
   return Normalise(Quat(scale + glm::dot(from, to), axis.x, axis.y, axis.z));
 }
 
-// Returns the axis of the knee. A positive rotation about it moves the shank backward.
-// `reference` is the hinge of the knee in world axes.
+// Returns the axis of the knee, not normalized. A positive rotation about it moves the shank
+// backward. `reference` is the hinge of the knee in world axes.
 Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Vec3& reference) {
   const float scale = std::sqrt(glm::dot(thigh, thigh) * glm::dot(shank, shank));
   const Vec3 plane = glm::cross(thigh, shank) / scale;

@@ -25,15 +25,16 @@ constexpr double kMargin = 0.1;
 // If the error is not much larger than this, weights shrink less, so that they are a smooth
 // function of the request.
 constexpr double kShrinkErrorM = 1e-4;
-// Ridge added to the diagonal, relative to the trace. It handles directions that no example spans.
+// Ridge added to the diagonal, relative to the trace. It keeps the matrix positive definite if the
+// examples do not span all parameters.
 constexpr double kRidge = 1e-9;
 constexpr int kMaxHalvings = 3;
 // Stride variation changes poses only in groups with at most this many parameters, that is, in
 // straight steps. Other steps are rarely repeated. Their examples differ so much that soles would
 // enter the ground.
 constexpr std::size_t kMaxVariedParameters = 2;
-// Size of a variation in radians, as measured by PoseChange. Larger variations push the toes of
-// `builtin` into the ground.
+// Size of a variation in radians, as measured by PoseChange. Larger variations push toes into the
+// ground in steps of the generated library.
 constexpr double kVariedRad = 0.04;
 // Fractions of a step at which PoseChange measures the pose.
 constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
@@ -177,8 +178,9 @@ class WeightStep {
   bool is_solvable_ = false;
 };
 
-// Returns by how much the pose changes if the weights change by `change` [n], in radians: the root
-// of the sum of the squared rotations of all joints, averaged over kVariedAt.
+// Returns by how much the pose changes if the weights change by `change` [n], in radians: the
+// square root of the sum of the squared angles of all joints, where the sum is a mean over
+// kVariedAt.
 double PoseChange(const MotionGroup& group, const GridLayout& layout,
                   std::span<const float> change) {
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);

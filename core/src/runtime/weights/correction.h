@@ -21,23 +21,23 @@ inline constexpr double kMaxCorrectedWeightSum = 2.5;
 struct CorrectionLimits {
   int max_iterations = 3;
   double tolerance_m = 1e-5;  ///< Iterations stop when the error is at most this.
-  /// Negative weights are scaled until the sum of |w| before the correction is at most this.
+  /// Before the correction, negative weights are scaled down until the sum of |w| is at most this.
   double start_weight_sum = HUGE_VAL;
   double weight_sum = kMaxCorrectedWeightSum;  ///< Limit on the sum of |w| after correction.
 };
 
-/// Limits on the sum of |w| for climbing steps from few captured examples (decision 0048).
+/// Limits on the sum of |w| for climbing steps with few captured examples (decision 0048).
 inline constexpr double kSparseStartWeightSum = 1.1;
 inline constexpr double kSparseWeightSum = 1.4;
 
 /// Returns the limits for starting a movement: 3 iterations for groups with one or two parameters
 /// (straight steps, jumps) and 8 iterations for others.
 ///
-/// Groups with height parameters and fewer than four captured examples per coefficient of the
-/// linear part of the weights (d + 1) have smaller limits on weights. Otherwise, requests near the
-/// border of their hull would amplify the individual variation of the examples, and knees and
-/// pelvis would jolt. If the movement then misses its parameters, planting still puts the feet on
-/// their footprints.
+/// The limits on weights are smaller for captured groups of steps with height parameters, if the
+/// group has fewer than four examples per coefficient of the linear part of the weights (d + 1).
+/// Otherwise, requests near the border of the hull would amplify the individual variation of the
+/// examples, and knees and pelvis would jolt. If the movement then misses its parameters, planting
+/// still puts the feet on their footprints.
 [[nodiscard]] CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group);
 
 /// Result of a correction.
@@ -90,16 +90,17 @@ class CorrectionScratch {
 /// the sum of |w| would come within 0.1 of its limit, the part of w that does not affect the
 /// parameters shrinks by the required amount. If an iteration increases the error or makes the
 /// weights too large, its change is halved up to three times. The best w is kept, so the result is
-/// never worse than without correction. An error remains if no weights within the limit reach p^.
+/// never worse than without correction. An error remains if no weights within the limit reach p^,
+/// or if the iterations do not suffice.
 ///
 /// With `variation`, the weights of groups with one or two parameters deviate before they are
 /// corrected. The part of the deviation that changes the parameters is removed to first order, with
-/// D as above. The rest is scaled to a fixed change of the pose. If the correction then cannot
-/// reach p^, it is repeated without variation.
+/// D as above. The rest is scaled to a fixed change of the pose, or less if the limits require it.
+/// If the correction then leaves an error above 0.1 mm, it is repeated without variation.
 ///
 /// Sets movement.group to -1. If the group is part of a library, the caller must set the index
-/// afterwards. Does not allocate if `movement.weights` has room for the group. Gives the same bytes
-/// on every machine.
+/// afterwards. Does not allocate if `movement.weights` has room for the group. The result has the
+/// same bits on every machine.
 Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
                           const CorrectionLimits& limits, CorrectionScratch& scratch,
                           Movement& movement,

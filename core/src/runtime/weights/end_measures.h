@@ -5,11 +5,14 @@
 
 namespace stridewire {
 
-/// Measurements of a movement's first and last pose. Feet are measured at their balls.
+/// Measurements of a movement's first and last pose. Feet are measured at their balls. In jumps,
+/// the left foot counts as the moving foot.
 struct EndMeasures {
-  /// Vector from the fixed foot to the moving foot in the first pose, in its heading frame.
+  /// Vector from the fixed foot to the moving foot in the first pose, in the heading frame of that
+  /// pose.
   DVec3 start_m = DVec3(0.0);
-  /// Vector from the fixed foot to the moving foot in the last pose, in its heading frame.
+  /// Vector from the fixed foot to the moving foot in the last pose, in the heading frame of that
+  /// pose.
   DVec3 end_m = DVec3(0.0);
   /// Displacement of the midpoint between the balls, in the heading frame of the first pose.
   DVec3 travel_m = DVec3(0.0);

@@ -128,7 +128,8 @@ ParameterValues EndPoses::Measure() const {
                        .heading_change_rad = heading_change_rad_});
 }
 
-// Adds the derivative of the position of a foot's ball in the world direction `along`.
+// Adds the derivative of dot(along, ball), where `ball` is the position of a foot's ball relative
+// to the base frame.
 //
 // The loop runs from the root to the ball. g is the direction in the axes of the parent of the
 // current joint. With the arm v (the vector from the joint to the ball) and the joint's rotation q
@@ -136,8 +137,8 @@ ParameterValues EndPoses::Measure() const {
 //
 //   R(q) v = (w w - u u) v + 2 (u v) u + 2 w (u x v)
 //
-// The part of its derivative that only changes the length of q is subtracted, because rotations are
-// normalized.
+// The part of the derivative of R(q) v that results from a change of the length of q is subtracted,
+// because rotations are normalized.
 void EndPoses::AddGradient(const End& end, std::size_t foot, const DVec3& along,
                            Gradient& gradient) const {
   const DVec3& arm = end.arms_m[foot];

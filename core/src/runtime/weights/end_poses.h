@@ -13,7 +13,7 @@ namespace stridewire {
 /// Computes the parameters of a blend from its first and last pose, and their derivatives with
 /// respect to the weights, for weight correction. Evaluates only the chains of joints from the root
 /// to the balls of the feet, with the base frame at the origin. Allocates only in its constructor.
-/// Gives the same bytes on every machine.
+/// The results have the same bits on every machine.
 class EndPoses {
  public:
   /// Borrows `skeleton`.
@@ -30,9 +30,10 @@ class EndPoses {
   /// Returns the parameters of the blend, as MeasureMovement does.
   [[nodiscard]] ParameterValues Measure() const;
 
-  /// Writes J = a'(w), the derivatives of the parameters with respect to each weight at the last
-  /// blend, to `slopes` [d][n], in metres or radians. A change of a single weight also changes the
-  /// sum of the weights, so only combinations that keep the sum are meaningful.
+  /// Writes J = a'(w), the derivatives of the parameters with respect to each weight, to `slopes`
+  /// [d][n], in metres or radians. They are those for the weights of the last Blend. A change of a
+  /// single weight also changes the sum of the weights, so only combinations that keep the sum are
+  /// meaningful.
   void MeasureSlopes(std::span<double> slopes);
 
  private:
@@ -53,7 +54,7 @@ class EndPoses {
     std::array<DVec3, 2> arms_m;  // [foot]: vector from the root to the ball, in the base frame.
     [[nodiscard]] DVec3 Ball(std::size_t foot) const { return root_m + arms_m[foot]; }
   };
-  // Derivative of a measurement with respect to the numbers in an example's row.
+  // Derivative of a measurement with respect to the numbers in a blended row.
   class Gradient {
    public:
     void Clear() { joint_count_ = 0; }
@@ -61,8 +62,8 @@ class EndPoses {
     // Adds the derivative with respect to the four components of a joint's quaternion. The joint
     // index after the last one stands for the root's position and yaw.
     void Add(int joint, const DVec3& by_xyz, double by_w);
-    // Adds the derivative with respect to the weight of each example, whose rows are at `rows`, to
-    // `slopes` [n].
+    // Adds the derivative with respect to the weight of each example to `slopes` [n]: the product
+    // of this gradient and the example's row. `rows` [n][row_floats] are the rows of the examples.
     void AddTo(const float* rows, std::size_t row_floats, std::span<double> slopes) const;
 
    private:
