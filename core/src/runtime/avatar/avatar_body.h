@@ -62,7 +62,8 @@ struct AvatarBody {
   /// Starts the movement at `base` with the playback speed `rate`. Its weights must be set.
   void StartWeighted(const BaseFrame& base, double rate);
 
-  /// Makes the avatar enter the movement that was just started at `time_s` instead of 0.
+  /// Makes the avatar enter the current movement at `time_s` instead of 0. Call it after
+  /// StartWeighted.
   void SetStartOffset(double time_s);
 
   /// Plans the feet of the movement if they are planted, and computes the difference pose that

@@ -87,7 +87,8 @@ class AvatarReplica {
   }
   /// AvatarSimulation::idle() of the avatar: it stands and has no queued requests.
   [[nodiscard]] bool idle() const { return is_idle_; }
-  /// The current movement, or null while standing.
+  /// The movement that determines the displayed pose: the current movement or, while standing, the
+  /// idle motion. Null if the avatar stands without idle motion.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
   /// A number that changes whenever a record contains a whole state, or starts or ends a movement.
   /// While it stays the same, the movement does not change.
@@ -95,7 +96,7 @@ class AvatarReplica {
   /// Time within the previous movement at which it ended or was interrupted when this one began.
   /// Negative if this movement did not directly follow another one.
   [[nodiscard]] double previous_end_s() const { return previous_end_s_; }
-  /// Time from the start of the movement to the last tick. Undefined while standing.
+  /// Time from the start of movement() to the last tick. Undefined if movement() is null.
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// True if layers change the displayed pose.
   [[nodiscard]] bool has_layers() const { return may_have_layers_ && body_.has_layers; }

@@ -156,7 +156,7 @@ class AvatarSimulation {
   /// The current movement, or null while standing. Valid until the next Advance.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
   /// The movement that determines the displayed pose: the current movement or, while standing, the
-  /// idle motion. Null if the avatar stands still. Valid until the next Advance.
+  /// idle motion. Null if the avatar stands without idle motion. Valid until the next Advance.
   [[nodiscard]] const Movement* displayed_movement() const {
     return is_moving_ || is_idling_ ? &body_.movement : nullptr;
   }
@@ -179,8 +179,8 @@ class AvatarSimulation {
   [[nodiscard]] const AvatarEvent* started() const {
     return is_moving_ || is_in_stand_ ? &started_ : nullptr;
   }
-  /// The requests that have not started, in order. While a walk is in progress, it is the first of
-  /// them.
+  /// The requests in the queue, in order. A request leaves the queue when it starts. Only a walk
+  /// stays at the head of the queue until it ends.
   [[nodiscard]] std::span<const MovementRequest> queue() const {
     return std::span(queue_).subspan(queue_head_);
   }

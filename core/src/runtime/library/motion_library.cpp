@@ -33,8 +33,8 @@ constexpr std::size_t kAlignment = 64;
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
-// The limits from here to kMaxRadiusFactor are far beyond human movements. Larger values would lose
-// too much precision as floats.
+// The limits from here to kMaxRadiusFactor are far outside the range of human movements. Values
+// beyond them would lose too much precision as floats.
 //
 // Maximum absolute value of a parameter, in metres or radians.
 constexpr double kMaxParameter = 100.0;
@@ -145,8 +145,8 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
 }
 
 // Checks that all sites are inside the ranges of their parameters. Requests are clamped to the hull
-// of the sites, so the bounds on weights that CheckWeightTables verifies for these ranges hold for
-// every request.
+// of the examples, enlarged by less than kReach, so the bounds on weights that CheckWeightTables
+// verifies for these ranges hold for every request.
 Status CheckSites(const MotionGroup& group) {
   const std::size_t d = group.parameters.size();
   for (std::size_t l = 0; l < d; ++l) {

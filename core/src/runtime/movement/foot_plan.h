@@ -72,15 +72,17 @@ struct FootResidual {
   DVec3 offset_m_s = DVec3(0.0);
   double turn_rad = 0.0;
   double turn_rad_s = 0.0;
-  double over_s = 0.2;  ///< Time after which the residual is zero.
+  double over_s = 0.2;  ///< Time from Movement::start_offset_s until the residual is zero.
 };
 
-/// Additional motion of the root, so that it approaches its planned place above the standing feet
-/// over `over_s`. Without it, the rotations of the legs would move the root there while the
-/// difference pose fades out. This is too abrupt if the place is far away or if the root moves at
-/// another speed. The motion is horizontal, except where the root rises on terrain.
+/// Additional motion with which the root approaches its planned place above the standing feet over
+/// `over_s`. Without this motion, the rotations of the legs would move the root there while the
+/// difference pose fades out. That would be too abrupt if the place is far away or if the root
+/// moves at another speed. The motion is horizontal, except where the root rises on terrain.
 struct RootApproach {
-  DVec3 offset_m = DVec3(0.0);    ///< Displacement of the root due to the rotations of the legs.
+  /// Displacement of the root relative to the standing feet that the difference pose causes at the
+  /// start of the movement.
+  DVec3 offset_m = DVec3(0.0);
   DVec3 offset_m_s = DVec3(0.0);  ///< Velocity of this displacement at the start of the movement.
   /// Duration. If it is at most Movement::ease_out_s, there is no additional motion.
   double over_s = 0.0;
@@ -97,8 +99,9 @@ using PackedFootPlan = std::array<float, kPackedPlanFloats>;
 /// the planted pose.
 struct FootPlan {
   bool is_active = false;
-  /// If the previously displayed pose had no planted feet, the changes due to planting fade in over
-  /// this time: soles are lifted out of the ground, and the root is lowered so that legs can bend.
+  /// If the feet were not planted before, or if an earlier fade was interrupted, the changes due to
+  /// planting fade in over this time: soles are lifted out of the ground, and the root is lowered
+  /// so that legs reach it. Otherwise 0.
   double plant_fade_s = 0.0;
   /// The plan in the layout of the planting kernels. Set when the plan is complete.
   PackedFootPlan packed{};

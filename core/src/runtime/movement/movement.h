@@ -53,7 +53,8 @@ struct Movement {
   /// Plan of the feet. If it is not active, feet follow the blended pose.
   FootPlan feet;
 
-  /// Requested parameters after clamping to the range of the examples.
+  /// Requested parameters after clamping to the enlarged hull of the examples
+  /// (RequestPlan::applied).
   ParameterValues parameters;
   double heading_change_rad = 0.0;  ///< Blended heading change of the examples.
 

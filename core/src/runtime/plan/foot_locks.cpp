@@ -9,7 +9,8 @@ namespace stridewire {
 namespace {
 
 constexpr double kHalfFootWidthM = 0.04;
-// A sole rests on ground that rises up to kBumpM above its plane. Higher ground is a wall.
+// A sole rests on bumps that rise less than kBumpM above the plane fitted to the ground
+// (FootSupport). Higher ground is a wall.
 constexpr double kBumpM = 0.05;
 
 // If the ground ahead rises by more than this per metre, a foot does not tilt further.

@@ -45,7 +45,9 @@ void StandOn(const FootLocks& locks, Movement& movement);
 /// fixed distance from the ground plane, so its vertical distance increases with the slope.
 [[nodiscard]] double SlopeRise(const LegRig::Side& side, const Vec3& normal);
 
-/// Sets the height and the ground normal at the landing of a trajectory to those of the terrain.
+/// Sets the height and the ground normal at the landing of a trajectory to those of the terrain. If
+/// the ground ahead rises steeply, chooses a flatter normal and a higher landing, so that the foot
+/// stands on its toes.
 void LandOnGround(const Terrain& terrain, const LegRig::Side& side, FootTrajectory& trajectory);
 
 }  // namespace stridewire

@@ -236,8 +236,8 @@ class Planner {
     }
     const HeightRange lowest = LevellingRange(lowest_m);
     const HeightRange highest = LevellingRange(std::max(at_landing_m, at_end_m));
-    // If no height keeps both the lowest and the highest sole in range, the lowest one may sink by
-    // up to another kMaxSinkM.
+    // If no correction keeps both the lowest and the highest sole within the limits, the lowest one
+    // may sink by up to another kMaxSinkM.
     if (lowest.min_m > highest.max_m) return std::max(highest.max_m, lowest.min_m - kMaxSinkM);
     return std::clamp(0.0, lowest.min_m, highest.max_m);
   }

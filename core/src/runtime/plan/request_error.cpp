@@ -47,7 +47,7 @@ RequestError StepError(const MotionLibrary& library, const RequestPlan& plan, co
                                    plan.max_extra_turn_rad);
   }
 
-  // Landing places relative to the fixed foot, in the heading at the start.
+  // Landing places relative to the fixed foot and to the heading at the start.
   const DVec3 requested_m = RotateYaw(requested.turn_rad, requested.vector_m);
   DVec3 reached_m = RotateYaw(reached.turn_rad, reached.vector_m);
   DVec3 missed_m = reached.vector_m - requested.vector_m;

@@ -70,10 +70,10 @@ constexpr double kClimbWeight = 0.5;
 constexpr double kMaxClimbMissM = 0.16;
 constexpr double kChangeM = 1e-6;
 
-// Maximum transition distance between movements that may follow each other. It is at most 0.125 m
-// for captured movements that match, and more than 0.2 m for a stride followed by a movement that
-// starts with the feet together. In some captures, no movement starts close to the stand pose, so
-// the limit also increases with the distance from the stand.
+// Maximum transition distance between movements that may follow each other. Measured distances are
+// at most 0.125 m for captured movements that match, and more than 0.2 m for a stride followed by a
+// movement that starts with the feet together. In some captures, no movement starts close to the
+// stand pose, so the limit also increases with the distance from the stand.
 constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
 

@@ -23,8 +23,8 @@ struct FootState {
 
 /// Target of a step or jump.
 struct RequestTarget {
-  /// Steps: vector from the fixed to the moving foot at the end, in the heading after the step.
-  /// Jumps: displacement of the base frame, in the heading before the jump.
+  /// Steps: vector from the fixed to the moving foot at the end, relative to the heading after the
+  /// step. Jumps: displacement of the base frame, relative to the heading before the jump.
   DVec3 vector_m = DVec3(0.0);
   double turn_rad = 0.0;  ///< Change of heading.
 };
@@ -53,7 +53,8 @@ struct RequestPlan {
   /// Target of the request. If no side was requested, `vector_m.x` is the current sideways distance
   /// between the feet.
   RequestTarget target;
-  /// The point closest to `requested` in the hull of the examples, enlarged by 10 %.
+  /// The point closest to `requested` in the hull of the examples, enlarged by 10 % (kHullGrowth).
+  /// Distances are weighted as in `distance_m`.
   ParameterValues applied;
   bool extrapolated = false;       ///< True if `applied` is outside the original hull.
   std::optional<Footprint> exact;  ///< Footprint requested by a step.
@@ -66,11 +67,15 @@ struct RequestPlan {
   bool is_side_given = false;  ///< Steps: true if the request specified the side.
   bool is_varied = true;       ///< Steps: true if the step may be varied (see StrideVariation).
   PlaybackPace pace;
-  /// True if `applied` differs from `requested` by more than 1e-6.
+  /// True if a parameter of `applied` differs from `requested` by more than 1e-6, or if the group
+  /// lacks a parameter that the request needs.
   bool clamped = false;
-  /// Distance between `applied` and `requested` in metres. A radian counts as 0.5 m.
+  /// Weighted distance between `applied` and `requested` in metres, plus the weighted errors of
+  /// requested parameters that the group lacks. The weights depend on the parameter and the
+  /// request. For example, the start of a step has a larger weight than its end.
   double distance_m = 0.0;
-  /// `distance_m` plus costs for extrapolation and for the positions of the feet.
+  /// `distance_m` plus costs for extrapolation, for the positions of the feet and, in libraries
+  /// with generated groups, for captured groups without an example nearby.
   double cost_m = 0.0;
 };
 
@@ -79,15 +84,15 @@ struct RequestPlan {
 inline constexpr double kHullGrowth = 0.1;
 
 /// Maximum distance between the end of a library's step and its footprint that planting may
-/// distribute over the swing. It applies to footprints of walks and beside the other foot. In
-/// libraries without steps in place, this is the only way to bring the feet together and to turn on
-/// the spot.
+/// distribute over the swing. It applies to steps of walks, and to steps that bring a foot beside
+/// the other one. In libraries without steps in place, such corrections are the only way to bring
+/// the feet together and to turn on the spot.
 inline constexpr double kMaxPlantedErrorM = 0.6;
 
 /// Plans a step in the group that covers it best, with parameters clamped to the hull of the group.
 /// The positions of the feet determine the start parameters, which have a larger weight than those
-/// of the end. If a group has no parameter for a requested turn, side or height, the whole value
-/// counts as the error.
+/// of the end. If a group has no parameter for a requested turn, side or height, its steps count as
+/// steps without a turn, on level ground, or as wide as the stand pose.
 ///
 /// If the request does not specify a foot, the foot other than `last_moved` moves. If the avatar is
 /// `standing` and `last_moved` fits better, that foot moves. If `after` is set, only groups that

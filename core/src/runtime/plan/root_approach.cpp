@@ -27,7 +27,7 @@ constexpr double kApproachToleranceS = 1e-7;
 
 double HorizontalLength(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 
-// Returns the length of an acceleration, with a smaller weight of its vertical component.
+// Returns the larger of the horizontal and the weighted vertical part of an acceleration.
 double WeightedLength(const DVec3& v) {
   return std::max(HorizontalLength(v), kVerticalWeight * std::fabs(v.y));
 }

@@ -48,7 +48,8 @@ double Levelling(double above_m) {
 }
 
 // Starts with the quartic that levels the sole at kLevelSamples. While the quartic is out of range
-// at other samples, corrects it for one sample after the other (Kaczmarz method).
+// at any sample, corrects it for one sample after the other, in at most kSweeps sweeps over all
+// samples (Kaczmarz method).
 Quartic LevellingQuartic(const std::array<double, kStanceSamples.size()>& above_m,
                          const std::array<HeightRange, kStanceSamples.size()>& ranges) {
   constexpr int kSweeps = 20;

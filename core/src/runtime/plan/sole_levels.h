@@ -13,9 +13,10 @@ inline constexpr double kMaxHoverM = 0.006;
 inline constexpr double kMaxSinkM = 0.003;
 inline constexpr double kMaxLevelM = 0.05;
 
-// kStanceSamples are fractions of the stance at which a standing foot is sampled. The sole is kept
-// within these limits at the samples with the indices kLevelSamples. At the other samples it may
-// exceed them by kStanceSlackM.
+// kStanceSamples are fractions of the stance at which a standing foot is sampled. LevellingQuartic
+// starts with a curve that keeps the sole within these limits at the samples with the indices
+// kLevelSamples. It then corrects samples at which the sole exceeds the limits by more than
+// kStanceSlackM.
 inline constexpr std::array<double, 16> kStanceSamples{
     0.0, 0.04, 0.1, 0.17, 0.25, 0.33, 0.42, 0.5, 0.58, 0.67, 0.75, 0.83, 0.9, 0.95, 0.98, 1.0};
 inline constexpr std::array<std::size_t, 5> kLevelSamples{0, 4, 7, 10, 15};
@@ -39,11 +40,13 @@ struct HeightRange {
 };
 
 /// Returns the range of heights by which a sole that is `above_m` above the ground may be raised,
-/// so that it exceeds kMaxHoverM or kMaxSinkM by at most `slack_m`.
+/// so that it exceeds kMaxHoverM or kMaxSinkM by at most `slack_m`. Negative heights lower the
+/// sole. Both ends of the range are limited to kMaxLevelM in either direction.
 [[nodiscard]] HeightRange LevellingRange(double above_m, double slack_m = 0.0);
 
 /// Returns by how much a sole that is `above_m` above the ground must be raised to be within the
-/// limits. Negative if it must be lowered, 0 if it is within them already.
+/// limits, at most kMaxLevelM. Negative if it must be lowered, 0 if it is within the limits
+/// already.
 [[nodiscard]] double Levelling(double above_m);
 
 /// Returns a curve over a stance which, if it is added to the height of the foot, keeps the sole on

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-// Maximum difference in height between the library's own step and the footprint, for strict plans
-// and libraries with climbing steps.
+// Maximum difference in height between the end of the library's own step and the footprint. It
+// applies to strict plans in libraries with climbing steps.
 constexpr double kMaxErrorHeightM = 0.08;
 // Maximum error of the heading of the body after a step of a plan that is not strict.
 constexpr double kMaxLooseErrorRad = 0.5;

@@ -14,7 +14,7 @@ constexpr double kClearanceM = 0.037;
 constexpr double kPassingRadiusM = 0.02;
 // The middle lift may be negative if the foot has to rise elsewhere in the swing. It lowers the
 // foot by at most the larger of two values: the largest missing clearance, and kMiddleSinkPerClimb
-// times the height difference between the footprints. It never exceeds kMaxMiddleSinkM.
+// times the height difference between the footprints, and never by more than kMaxMiddleSinkM.
 constexpr double kMiddleSinkPerClimb = 0.5;
 constexpr double kMaxMiddleSinkM = 0.2;
 // If a lift exceeds kNoticeableLiftM, ChooseSwing also tries to shift the middle of the swing

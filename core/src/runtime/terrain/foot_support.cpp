@@ -39,7 +39,8 @@ class SolePoints {
   [[nodiscard]] static constexpr int size() { return kRows * kColumns; }
 
   // Marks the points that are connected to the ball by slopes of at most kMaxSlope. Passes over all
-  // points until nothing changes: twice on ordinary ground, and at most once per point.
+  // points until nothing changes. Without edges, this takes nine passes, because marks spread
+  // towards the heel by about one row per pass.
   void Spread() {
     ball().is_reached = true;
     for (bool is_changed = true; is_changed;) {

@@ -209,8 +209,8 @@ bool Terrain::TryIndex(std::int32_t cells_x, std::int32_t cells_z) {
 }
 
 Terrain::CellRange Terrain::IndexCells(const Rectangle& area) const {
-  // The index of a cell increases with the coordinate, so a box and a point inside it always have a
-  // cell in common.
+  // The index of a cell never decreases as the coordinate increases. The cells of a box therefore
+  // always include the cell of a point inside the box.
   return {CellOf((area.min.x - bounds_.min.x) * cells_per_m_x_, cells_x_),
           CellOf((area.max.x - bounds_.min.x) * cells_per_m_x_, cells_x_),
           CellOf((area.min.z - bounds_.min.z) * cells_per_m_z_, cells_z_),
