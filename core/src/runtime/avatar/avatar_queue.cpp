@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-// A queue keeps memory for this many requests when it becomes empty.
+// If an empty queue has memory for more requests than this, the next Enqueue releases it.
 constexpr std::size_t kUsualQueue = 8;
 
 }  // namespace

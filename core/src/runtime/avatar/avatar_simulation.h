@@ -52,8 +52,9 @@ struct AvatarChange {
 
 /// Simulates one avatar: its base frame, queue of requests, current movement and displayed pose.
 ///
-/// Time is an argument; only Advance moves the avatar. The same library, start, requests and time
-/// steps give the same pose bytes on every machine. Not thread-safe; one owner.
+/// Time is an argument. The avatar moves only in Advance, AdvanceAll, AdvanceStates and Teleport.
+/// The same library, start, options, calls and time steps give the same pose bytes on every
+/// machine. Not thread-safe; one owner.
 ///
 /// After construction, only these calls allocate: Enqueue, because the queue may grow to kMaxQueue
 /// requests; calls that drop requests; SetLayer; the first Advance; and an Advance with more events

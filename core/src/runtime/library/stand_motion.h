@@ -15,8 +15,9 @@ inline constexpr double kIdleLoopS = 40.0;
 /// Both groups have the kind kStand, one example and no parameters, and are evaluated like steps.
 ///
 /// - settle: the stand pose. An avatar blends into it after its last movement.
-/// - idle: a loop of breathing, sway and weight shifts. Its last kIdleTailS seconds repeat its
-///   first ones, so that a blend that begins late in the loop has time to fade out.
+/// - idle: a loop of breathing, sway and weight shifts, which takes kIdleLoopS. The group also
+///   contains a repetition of the first 2 s after the loop, so that a blend that begins late in the
+///   loop has time to fade out.
 ///
 /// The feet do not move. The same skeleton and stand pose give the same bits on every machine.
 struct StandMotion {

@@ -101,7 +101,7 @@ struct FootPlan {
   bool is_active = false;
   /// If the feet were not planted before, or if an earlier fade was interrupted, the changes due to
   /// planting fade in over this time: soles are lifted out of the ground, and the root is lowered
-  /// so that legs reach it. Otherwise 0.
+  /// so that legs reach their targets. Otherwise 0.
   double plant_fade_s = 0.0;
   /// The plan in the layout of the planting kernels. Set when the plan is complete.
   PackedFootPlan packed{};

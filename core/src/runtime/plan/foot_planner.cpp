@@ -32,8 +32,8 @@ constexpr double kMaxAsideM = 0.05;
 constexpr double kLevelClearanceM = 0.012;
 constexpr double kMaxEarlyLiftM = 0.03;
 // Fractions of the difference pose that have faded out. If less than kLeastSettled has faded out
-// when a foot leaves the ground, ReleaseHeight corrects its height only in part. Samples at which
-// less than kMostlySettled has faded out do not change the correction.
+// when a foot leaves the ground, ReleaseHeight corrects the height of the foot only in part.
+// Samples at which less than kMostlySettled has faded out do not change the correction.
 constexpr double kLeastSettled = 0.2;
 constexpr double kMostlySettled = 0.7;
 

@@ -47,9 +47,10 @@ struct TransitionPath {
 ///   step may not follow, the step uses the best group that may, provided that the request is then
 ///   in reach.
 /// - If the feet are apart, they must come together before a jump, and before a step of the foot
-///   that moved last. This is not necessary if they are within 0.25 m of their positions in the
-///   movement's examples. In this case, a step is inserted only if it brings the feet closer
-///   together by 3 cm (before a jump) or reduces the cost of the request by 0.25 m (before a step).
+///   that moved last. This is not necessary if the forward distance between the feet differs by at
+///   most 0.25 m from that at the start of the planned movement. In this case, if the request is in
+///   reach, a step is inserted only if it brings the feet closer together by 3 cm (before a jump)
+///   or reduces the cost of the request by 0.25 m (before a step).
 /// - No steps are inserted before steps to footprints.
 /// - No step is inserted if the request would still be out of reach after it (RequestError). If no
 ///   step is inserted, the returned plan may be out of reach.

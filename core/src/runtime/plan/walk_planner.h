@@ -31,7 +31,7 @@ struct WalkProgress {
   std::size_t next_waypoint = 0;
   int steps = 0;
   int steps_without = 0;  ///< Number of successive steps without progress.
-  /// Minimum of the remaining effort so far (WalkSteering::EffortM).
+  /// Remaining effort when the walk last made progress (WalkSteering::EffortM).
   double least_effort_m = std::numeric_limits<double>::infinity();
   /// True if the terrain has ruled out a footprint of this walk: the ground at it is too steep or
   /// too uneven, or the ground at or before it is too high or too low.
@@ -43,7 +43,8 @@ struct WalkProgress {
 /// Measures the speed of a walk. A new walk starts with a default-constructed value.
 class WalkPace {
  public:
-  /// Call it where a step of the walk begins or ends, with the base frame and the time.
+  /// Call it at the start of the walk and after each of its steps, with the position of the base
+  /// frame and the time.
   void Add(const DVec3& position_m, double time_s);
   /// Returns the mean speed without the first kStartSteps and the last kStopSteps steps. Returns 0
   /// if no other steps are left.

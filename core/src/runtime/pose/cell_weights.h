@@ -5,7 +5,7 @@
 namespace stridewire {
 
 /// Catmull-Rom weights of the grid points around a position in a grid. Points beyond the ends of
-/// the grid are extrapolated quadratically.
+/// the grid are extrapolated quadratically. In a grid of two points, the weights are linear.
 struct CellWeights {
   int first = 0;  ///< Grid point to which weights[0] belongs.
   int count = 0;  ///< Number of weights, 2 to 4.

@@ -42,8 +42,9 @@ class GridCache {
   void SumExamples(const MotionGroup& group, std::span<const float> weights, int point,
                    float* row) const;
 
-  // Maximum number of cached grid points. It is sufficient for all points of most movements. If
-  // rows have the maximum length, only the four points around a time fit.
+  // Maximum number of cached grid points. Skeletons with up to 31 joints have this many slots,
+  // which is sufficient for all points of most movements. With rows of the maximum length, only the
+  // four points around a time fit.
   static constexpr std::size_t kMaxSlots = 32;
   static constexpr std::size_t kRowsFloats = 4 * kMaxRowFloats;
   std::size_t row_floats_;

@@ -12,7 +12,7 @@ namespace stridewire {
 namespace {
 
 // The grid index starts with about one cell per box. It is refined as long as a cell contains more
-// than kFewBoxes boxes.
+// than kFewBoxes boxes and smaller cells contain fewer.
 constexpr std::int32_t kMaxIndexCellsPerAxis = 1024;
 constexpr std::size_t kFewBoxes = 16;
 // Minimum extent of the indexed area. It prevents cells of size zero.
