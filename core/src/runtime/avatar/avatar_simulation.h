@@ -150,7 +150,8 @@ class AvatarSimulation {
   [[nodiscard]] std::span<const AvatarEvent> events() const { return events_; }
   [[nodiscard]] const BaseFrame& base() const { return base_; }
   [[nodiscard]] int queue_size() const { return static_cast<int>(queue_.size() - queue_head_); }
-  /// True if the avatar stands still and its queue is empty.
+  /// True if the avatar stands, possibly with idle motion, no requested stand is in progress, and
+  /// the queue is empty.
   [[nodiscard]] bool idle() const { return !is_moving_ && !is_in_stand_ && queue_size() == 0; }
   [[nodiscard]] const MotionLibrary& library() const { return *body_.library; }
 
@@ -305,7 +306,8 @@ class AvatarSimulation {
   bool is_settled_ = false;        // True if the avatar stands in the stand pose.
   bool is_idle_reported_ = false;  // True if a kIdle event was sent since the last request.
   bool was_idle_ = false;          // Value of idle() after the previous Advance.
-  // True if the last step left the feet apart, so that a closing step must precede a stand.
+  // True if the last step left the feet apart, so that a step which brings them together must
+  // precede a stand.
   bool is_walking_ = false;
   // True if the request at the head of the queue does not wait for the end of the movement.
   bool interrupts_ = false;

@@ -31,8 +31,9 @@ struct FootTrajectory {
   DVec3 release_velocity_m_s = DVec3(0.0);  ///< Velocity of the offset at release.
   DVec3 land_offset_m = DVec3(0.0);         ///< Offset of the ball from b(t) at landing.
   DVec3 land_velocity_m_s = DVec3(0.0);     ///< Velocity of the offset at landing.
-  // Corrections of the height and heading of the blended foot: at t = 0, after the difference pose
-  // has faded out, and from landing on. If `locks_height`, heights of the ball above the footprint.
+  // Corrections of the height and heading of the blended foot: at Movement::start_offset_s, after
+  // the difference pose has faded out, and from landing on. If `locks_height`, `height_m` contains
+  // heights of the ball above the footprint.
   std::array<double, 3> height_m{};
   std::array<double, 3> turn_rad{};
   /// An additional height that keeps the sole of a step's supporting foot on the ground:

@@ -56,10 +56,10 @@ struct FootPlanJob {
 };
 
 /// Plans the feet of a movement. Sets `movement.feet`, the base position and the difference pose
-/// relative to the source. The base position is chosen so that the staying foot (in a jump, the
-/// centre of both feet) keeps its place. Walks therefore do not drift. Never allocates. Returns the
-/// feet of the blended pose with its difference pose, at the start of the movement and kBlendStepS
-/// later.
+/// relative to the source. The base position is chosen so that the staying foot (in a jump or
+/// stand, the centre of both feet) keeps its place. Walks therefore do not drift. Never allocates.
+/// Returns the feet of the blended pose with its difference pose, at the start of the movement and
+/// kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const FootPlanJob& job, const LandingTarget& target);
 
 /// Repeats a plan from its decisions, with the same bits. Does not use the heading change of the

@@ -25,8 +25,8 @@ constexpr double kTogetherRad = 0.15;
 // A foot within this distance of its footprint at the goal is at the goal.
 constexpr double kAtGoalM = 1e-3;
 constexpr double kAtGoalRad = 2e-3;
-// The same tolerances after a step that led to the goal. They are larger, because the library's
-// steps may not turn the feet or the body far enough.
+// The same tolerances after a step that led to the goal. They are larger, because steps of the
+// library often do not turn the feet or the body far enough.
 constexpr double kAimedM = 0.02;
 constexpr double kAimedRad = 0.5;
 constexpr double kAimedBodyRad = 0.25;
