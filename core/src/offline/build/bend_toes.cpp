@@ -20,8 +20,8 @@ constexpr double kMaxBendRad = 1.05;
 // this, the foot counts as standing on level ground. At the ends of level steps, balls are up to
 // 2 cm below and up to 6 cm above that height.
 constexpr double kLevelM = 0.07;
-// If the toe tips of the stand pose differ from those in mid-stance by at least this, the soles of
-// the stand pose are not flat.
+// If the height of a toe tip relative to its ball differs by at least this between the stand pose
+// and mid-stance, the sole is not flat in the stand pose, and only mid-stance counts.
 constexpr double kSameToesM = 0.02;
 // Toes whose horizontal extent is shorter than this point straight up or down. They are not bent.
 constexpr double kMinFlatM = 1e-3;

@@ -34,7 +34,8 @@ class ToeBender {
   explicit ToeBender(const RawLibrary& library);
 
   /// Bends the toes of an example. Does nothing if planting does not support the legs
-  /// (LegRig::is_usable), if the feet have no toe joint, or if the example has no swing.
+  /// (LegRig::is_usable) or if the example has no swing. Leaves out feet without a toe joint, and
+  /// feet that are the fixed foot of no captured step, because their resting heights are unknown.
   void Bend(MovementKind kind, RawExample& example) const;
   /// Same, but for a resampled example. `cells` are those of its group.
   void Bend(MovementKind kind, std::span<const int> cells, const GridLayout& layout,
@@ -46,8 +47,9 @@ class ToeBender {
     double tip_rise_m = 0.0;     // Minimum height of the toe tip relative to a resting ball.
   };
 
-  // Returns medians over the middles of the other foot's swings. If the toe tip is a little lower
-  // in the stand pose, uses its height there. Returns nullopt if the other foot swings in no step.
+  // Returns medians over the middles of the other foot's swings in captured steps. If the toe tip
+  // is a little lower in the stand pose, uses its height there. Returns nullopt if the other foot
+  // swings in no captured step.
   [[nodiscard]] std::optional<RestingFoot> MeasureFoot(const RawLibrary& library, Foot foot) const;
   // Returns the height of the resting ball of a foot at an end of an example, whose pose is `end`.
   [[nodiscard]] double BallHeightAt(Foot foot, ConstPoseSpan end) const;

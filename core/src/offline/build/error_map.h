@@ -21,9 +21,11 @@ struct ErrorMapOptions {
 /// The error e(p) = |p - a(p)| on a grid over a slice of the parameter space of a group (paper,
 /// Figure 1). The grid covers the range of the examples. Values outside their hull are NaN.
 struct ErrorMap {
-  /// Values of the two varying parameters, by column and by row.
+  /// Values of the parameters on the axes, by column and by row. If axis_y is -1, `y` contains only
+  /// 0.
   std::vector<double> x, y;
-  std::vector<double> others;      ///< Values of the constant parameters, by parameter.
+  /// [parameter]: values of the constant parameters. Those of varying parameters are not used.
+  std::vector<double> others;
   std::vector<double> error_m;     ///< [row][column]: error without weight correction.
   std::vector<double> weight_sum;  ///< [row][column]: sum of |w|.
   /// Largest error on the map. The group may have larger errors elsewhere.

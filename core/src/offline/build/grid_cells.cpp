@@ -17,8 +17,8 @@ constexpr int kMinCells = 2;
 constexpr int kMaxCells = 400;
 constexpr double kGrowth = 1.15;
 constexpr int kMaxRounds = 20;
-// Values that differ by less are equal. Numbers of frames are often exactly between two numbers of
-// cells, and rounding errors must not decide between them.
+// Values that differ by less count as equal. The duration of an interval is often exactly a whole
+// number of cells plus one half, and rounding errors must not decide which way it is rounded.
 constexpr double kTie = 1e-5;
 constexpr int kSamples = 24;  // Number of samples per interval and example.
 static_assert(kMaxCells * kMaxIntervals < MotionLibrary::kMaxGridPoints);
@@ -33,7 +33,7 @@ int CellsIn(double length_s, double fps) {
 std::vector<double> StoredErrors(const RawExample& example, const std::vector<int>& cells,
                                  const GridLayout& layout, const Quat& stand_root) {
   const GridExample stored = ResampleOnGrid(example, cells, layout, stand_root);
-  // A group with only this example, so that the code that plays examples also measures the error.
+  // A group with only this example, so that the error is that of the code that plays examples.
   MotionGroup alone;
   alone.example_count = 1;
   alone.cells = cells;

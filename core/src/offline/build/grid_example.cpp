@@ -75,7 +75,8 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
     SampleExample(example, warp.TimeAt(p), pose);
     float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
     double wrapped_rad = yaw_rad;
-    // If the root is nearly vertical, HeadingOf leaves the previous yaw unchanged.
+    // If the forward axis of the root is nearly vertical, HeadingOf leaves the previous yaw
+    // unchanged.
     HeadingOf(pose.rotations[0] * glm::conjugate(stand_root), wrapped_rad);
     yaw_rad = UnwrapAngle(wrapped_rad, yaw_rad);
     pose.rotations[0] = YawRotation(-yaw_rad) * pose.rotations[0];

@@ -22,8 +22,8 @@ struct GridExample {
 void SampleExample(const RawExample& example, double time_s, PoseSpan out);
 
 // Samples an example at the grid points, using its own keytimes. `stand_root` is the rotation of
-// the root in the stand pose, in which the heading is 0. It compensates for the axes of the root's
-// frame.
+// the root in the stand pose, in which the heading is 0. Headings are measured relative to it,
+// because the axes of the root's frame differ between skeletons.
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                                          const GridLayout& layout, const Quat& stand_root);
 
@@ -35,8 +35,8 @@ void SampleExample(const RawExample& example, double time_s, PoseSpan out);
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count);
 
-// Sets a row to a weighted sum of rows with normalised rotations. If rotations cancel each other
-// out, the row keeps its previous value.
+// Sets `row` to `sum`, a weighted sum of rows, and normalises its rotations. If the rotations of a
+// joint cancel each other out in the sum, `row` keeps its previous rotation of that joint.
 void SetBlendedRow(std::span<const float> sum, const GridLayout& layout, float* row);
 
 // Converts a row to a pose, with root position and yaw applied.

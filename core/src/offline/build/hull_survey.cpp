@@ -15,7 +15,7 @@ namespace stridewire {
 namespace {
 
 constexpr int kPeaks = 8;
-// Minimum distance between the starting points of ascents, in scaled parameters.
+// Minimum distance between the points from which Climb starts, in scaled parameters.
 constexpr double kPeakDistance = 0.3;
 constexpr int kClimbRounds = 24;
 constexpr double kSlopeStep = 1e-3;  // In scaled parameters.

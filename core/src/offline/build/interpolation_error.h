@@ -13,14 +13,14 @@ struct InterpolationError {
   double mean_m = 0.0;
   double max_m = 0.0;
   double corrected_mean_m = 0.0;
-  /// Largest error after CorrectWeights, which corrects every movement when it starts.
+  /// Largest error after CorrectWeights, which avatars use at the start of each movement.
   double corrected_max_m = 0.0;
   /// Largest error after at most three iterations of CorrectWeights.
   double corrected_in_3_max_m = 0.0;
   double corrected_weight_sum_max = 0.0;  ///< Largest sum of |w| after correction.
   double weight_sum_max = 0.0;            ///< Largest sum of |w| without correction.
   int samples = 0;                        ///< Number of samples over which the means are computed.
-  int iterations = 0;                     ///< Maximum number of iterations of a correction.
+  int iterations = 0;                     ///< Limit on the iterations of a correction.
 };
 
 /// Measures the error at the examples, at random convex combinations (see SampleHull), and at the

@@ -25,8 +25,8 @@ std::vector<int> ChildrenOf(const Skeleton& skeleton, int joint,
   return children;
 }
 
-// Returns the trunk: the longest chain of joints from the root up to the joint where arms and head
-// branch off.
+// Returns the trunk: the longest chain of joints from a child of the root, or of a joint between
+// root and hips, up to the joint where arms and head branch off. That joint is included.
 std::vector<int> TrunkOf(const Skeleton& skeleton, const std::vector<bool>& of_legs) {
   std::vector<int> trunk;
   for (int j = 0; j < skeleton.joint_count(); ++j) {

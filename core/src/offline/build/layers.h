@@ -27,8 +27,8 @@ inline constexpr double kLoopBlendS = 0.4;
 [[nodiscard]] std::vector<float> UpperBodyMask(const Skeleton& skeleton);
 
 /// Returns a mask with weight 1 for the named joints and all joints below them. Errors, with the
-/// name in Error::where: kNotFound if the joint does not exist, kInvalidArgument for the root and
-/// for a joint of a leg or above one.
+/// name in Error::where: kNotFound if the joint does not exist, kInvalidArgument for the root, a
+/// joint of a leg, or a joint between the root and a leg.
 [[nodiscard]] Expected<std::vector<float>> MaskOfJoints(const Skeleton& skeleton,
                                                         std::span<const std::string> names);
 
@@ -51,8 +51,8 @@ struct LayerCut {
 [[nodiscard]] Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton,
                                           const LayerCut& cut);
 
-/// Converts layers to the form in which a library stores them: resampled to about
-/// kLayerKeysPerSecond, and with the masked joints only.
+/// Layers in the form in which a library stores them: resampled to about kLayerKeysPerSecond, and
+/// with only those joints whose weight in the mask is above 0.
 class StoredLayers {
  public:
   [[nodiscard]] std::span<const LayerClip> views() const { return views_; }
@@ -71,14 +71,17 @@ class StoredLayers {
   std::vector<LayerClip> views_;
 };
 
-/// Converts layers. Errors, with the layer in Error::where: kInvalidArgument for an invalid or
-/// duplicate name, and for a mask that is empty or contains the root or a leg; kShapeMismatch;
-/// kOutOfRange; kLimitExceeded.
+/// Converts layers. Errors: kLimitExceeded if there are more than kMaxLayerClips layers. With the
+/// layer in Error::where: kInvalidArgument for an invalid or duplicate name, and for a mask that is
+/// empty or contains the root or a leg; kShapeMismatch if clip or mask has other joints than the
+/// skeleton; kOutOfRange for a weight outside [0, 1] or a loop shorter than 0.1 s; kLimitExceeded
+/// for a clip longer than ten minutes; and the errors of Clip::Validate.
 [[nodiscard]] Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers,
                                                  const Skeleton& skeleton);
 
 /// Returns a library with additional layers. They replace layers with the same name. Errors: those
-/// of StoreLayers.
+/// of StoreLayers and WriteLibrary, and kLimitExceeded if the result would have more than
+/// kMaxLayerClips layers.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> AddLayers(
     const MotionLibrary& library, std::span<const RawLayer> layers);
 

@@ -178,9 +178,9 @@ class Comparer {
     body_.plants_feet = true;
   }
 
-  // Returns the weights [example] that an avatar would use: for parameters projected onto the hull
-  // of the other examples, and corrected. Returns an empty vector if the weights cannot be solved.
-  // `products` is the result of MovementProducts.
+  // Returns the weights [example] that an avatar would use: those for the parameters `wanted`,
+  // projected onto the hull of the other examples, after correction. Returns an empty vector if the
+  // weights cannot be solved. `products` is the result of MovementProducts.
   std::vector<double> CardinalWeights(const Others& others, std::span<const double> products,
                                       std::span<const double> wanted) {
     const auto smoothness = ChooseSmoothness(group_, others.examples, products);
@@ -210,14 +210,15 @@ class Comparer {
     return {movement_.weights.begin(), movement_.weights.end()};
   }
 
-  // Returns poses of the movement with these weights as a viewer sees them: the feet start where
-  // those of the left-out example do, and the moving foot lands on its footprint.
+  // Returns the poses of the movement with these weights and planted feet, as an avatar displays
+  // them. The feet start where those of the left-out example start, and the moving foot lands on
+  // the footprint of that example.
   std::vector<Pose> PlantedPoses(int left_out, std::span<const double> weights,
                                  std::span<const Pose> truth) {
     const Foot moving = MovingFoot(group_.kind);
     const auto m = static_cast<std::size_t>(moving);
-    // Returns the feet of a pose. The moving foot stands at the height of a parameter, if there is
-    // one, and the other foot at 0.
+    // Returns the feet of a pose. The moving foot stands at the height that is the parameter
+    // `height`, or at 0 if the group does not have it. The other foot stands at 0.
     const auto feet_of = [&](const Pose& pose, ParameterName height) {
       FootLocks feet = FootLocksOf(library_.skeleton(), library_.leg_rig(), pose, 0.0, nullptr);
       if (const int l = group_.FindParameter(height); l >= 0) {

@@ -91,8 +91,8 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
       const std::size_t at = begin + 4 * j;
       float* q = &blend_.rows[at];
       const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-      // If the rotations cancel each other, their mean is undefined, so use those of the first
-      // example.
+      // If the rotations cancel each other out, their mean is undefined. The rotation of the first
+      // example is used instead.
       if (norm < 0.1f) {
         for (std::size_t c = 0; c < 4; ++c) {
           q[c] = set.examples.front()->rows[at + c];

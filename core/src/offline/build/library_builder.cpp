@@ -93,8 +93,8 @@ ParameterRange RangeOf(const std::vector<GridExample>& examples, std::size_t l) 
   return range;
 }
 
-// Returns parameters whose ranges are those of the examples and whose scales are the spreads of the
-// examples. Does not set the centres.
+// Returns parameters whose ranges are those of the examples and whose scales are their standard
+// deviations, or 1 if all examples have nearly the same value. Does not set the centres.
 std::vector<Parameter> ParametersOf(const RawGroup& group,
                                     const std::vector<GridExample>& examples) {
   std::vector<Parameter> parameters;

@@ -109,8 +109,7 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   const auto groups_offset = builder.CreateVector(groups);
   std::vector<flatbuffers::Offset<fb::Layer>> layers;
   for (const LayerClip& layer : content.layers) layers.push_back(AddLayer(builder, layer));
-  // Without layers, the field is omitted. The file then has the same bytes as one written before
-  // layers existed.
+  // Without layers, the field is omitted. Readers treat an absent field as an empty list.
   const auto layers_offset = layers.empty() ? 0 : builder.CreateVector(layers);
   std::vector<fb::Transition> transitions;
   for (const Transition& t : FindTransitions(content)) {

@@ -25,9 +25,10 @@ inline constexpr int kBodyPartCount = 4;
 /// - Legs: the hips and all joints below them.
 /// - Arms: all other joints of the left or right side, according to FindMirrorJoints. If a skeleton
 ///   has no mirror joints: all other joints that are more than 3 cm to the side of the root in the
-///   stand pose.
-/// - Head: joints of neither side, above the joint at which the arms branch off.
-/// - Trunk: all other joints.
+///   stand pose, and the joints below them.
+/// - Head: joints of neither side above the joint at which the arms branch off. There are none if
+///   the arms branch off at the root.
+/// - Trunk: all other joints, including those between root and hips.
 [[nodiscard]] std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton,
                                                   ConstPoseSpan stand_pose);
 
@@ -66,8 +67,8 @@ class PoseComparison {
                                                   std::span<const double> keytimes_s,
                                                   std::span<const int> cells);
 
-/// Returns the poses at the grid points of a blend with `weights` [n]. The blend starts at the
-/// origin with heading 0.
+/// Returns the poses at the grid points of a blend with `weights` [example]. The blend starts at
+/// the origin with heading 0.
 [[nodiscard]] std::vector<Pose> PosesAtGridPoints(const MotionGroup& group,
                                                   const GridLayout& layout,
                                                   std::span<const double> weights);

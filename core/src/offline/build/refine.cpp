@@ -241,8 +241,9 @@ class GroupRefiner {
     }
   }
 
-  // Measures the group with samples of another seed. If they contain errors above the limit, adds
-  // the worst of them to the samples, updates `survey` and returns true.
+  // Measures the group with samples of another seed. If they exceed the requested error or the
+  // limits, adds the worst of them to the samples and updates `survey`. Returns true if the largest
+  // error in `survey` is then too large.
   bool OtherSamplesFindMore(const Candidate& current, int check, HullSurvey& survey) {
     const std::vector<ParameterValues> others = SampleHull(
         current.group, 2 * options_.samples, options_.seed + static_cast<std::uint32_t>(check));
@@ -301,7 +302,7 @@ class GroupRefiner {
                              IsWithinBounds(survey, current->basis.condition);
       if (is_bare || is_better) keep();
     }
-    // Drops the sites that were added after the best state.
+    // `outcome` contains the best state. The sites that were added after it count as rejected.
     const MotionGroup& group = outcome.candidate->group;
     STRIDEWIRE_CHECK(group.site_count >= group.example_count);
     const auto kept = static_cast<std::size_t>(group.site_count - group.example_count + 1);
@@ -351,9 +352,10 @@ class GroupRefiner {
     return nullptr;
   }
 
-  // The amended rule: adds a pseudoexample at one of the largest errors. Chooses the position and
-  // the radius that minimize the largest error. Returns null if the error would not decrease,
-  // unless the pass accepts increases.
+  // The amended rule: adds a pseudoexample at the largest peak of the error where this is within
+  // the limits and decreases the largest error. If the pass accepts increases, the error need not
+  // decrease. Chooses the radius that minimizes the largest error. Returns null if there is no such
+  // peak.
   std::shared_ptr<const Candidate> AddBest(const Pass& pass, const Candidate& current,
                                            HullSurvey& survey, GroupRefinement& report) {
     const std::vector<ParameterValues> hot = HotPoints(survey);
@@ -409,7 +411,8 @@ class GroupRefiner {
   const RefineOptions& options_;
   std::span<GroupProbe> probes_;
   const std::function<bool(double)>& progress_;
-  std::vector<ParameterValues> samples_;  // Samples of the hull, and the peaks found so far.
+  // Samples of the hull, followed by the peaks found so far and other points with large errors.
+  std::vector<ParameterValues> samples_;
   double max_weight_sum_ = kMaxRefinedWeightSum;
   double sampled_weight_sum_ = kMaxRefinedWeightSum;
   double max_condition_ = kMaxRefinedCondition;

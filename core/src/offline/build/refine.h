@@ -29,13 +29,13 @@ enum class RadiusRule : std::uint8_t {
 /// Limits of the amended rule. If a group exceeds a limit even without pseudoexamples, the limit is
 /// the value of the group instead.
 inline constexpr double kMaxRefinedWeightSum = 2.5;  ///< Largest sum of |w| over the hull.
-inline constexpr double kMaxRefinedCondition = 1e3;
+inline constexpr double kMaxRefinedCondition = 1e3;  ///< GroupQuality::condition.
 /// Minimum distance between a pseudoexample and any other site, in scaled parameters.
 inline constexpr double kMinPseudoexampleDistance = 0.03;
 
 struct RefineOptions {
   RefineRule rule = RefineRule::kAmended;
-  double max_error_m = 0.01;  ///< Groups with smaller errors are not refined.
+  double max_error_m = 0.01;  ///< Groups whose largest error is smaller are not refined.
   /// Maximum number of pseudoexamples per group, 0 to kMaxPseudoexamples.
   int max_pseudoexamples = 32;
   int samples = 3000;  ///< Number of samples of the hull, 1 to kMaxSamples.
@@ -100,16 +100,17 @@ struct Refinement {
 /// max_error_m. If none does, it uses the pass whose largest error, measured with samples of
 /// another seed, is smallest. If that error is larger than without pseudoexamples, it adds none.
 ///
-/// 1. The radii of the examples are constant. Sites that do not reduce the error are rejected.
-/// 2. Radii shrink, and every site is added. Finally, the sites added after the best state are
-///    dropped. A second run of this pass tries several radii for each new site.
+/// 1. The radii of the examples do not change. Sites that do not reduce the error are rejected.
+/// 2. Radii shrink near new sites, and sites are added even if they increase the error, unless they
+///    exceed a limit. Finally, the sites added after the best state are dropped. A second run of
+///    this pass tries several radii for each new site, as passes 1 and 3 do.
 /// 3. Like 1, but with the radii of the examples 2 and 3 times as wide, which suits evenly spaced
 ///    examples.
 ///
 /// Existing pseudoexamples are removed first.
 ///
-/// Errors: kOutOfRange for an option. With the group in Error::where: kUnsupported, "stopped", if
-/// `progress` returned false, and the errors of CardinalBasisFit::Run.
+/// Errors: kOutOfRange for an option, and those of WriteLibrary. With the group in Error::where:
+/// kUnsupported, "stopped", if `progress` returned false, and the errors of CardinalBasisFit::Run.
 [[nodiscard]] Expected<Refinement> Refine(const std::shared_ptr<const MotionLibrary>& library,
                                           const RefineOptions& options = {});
 

@@ -20,7 +20,8 @@ constexpr std::size_t kExamplesPerOutlier = 10;
 constexpr double kInsideM = 1e-3;
 // Ratio of the standard deviation to the median absolute deviation (MAD).
 constexpr double kDeviationOfMad = 1.4826;
-// Smaller deviations are replaced with this value, because their differences are not significant.
+// Lower limits of the estimated standard deviations. Without them, insignificant differences would
+// count as outliers.
 constexpr double kMinPoseDeviationM = 2e-3;
 constexpr double kMinDurationDeviationS = 5e-3;
 
@@ -54,6 +55,7 @@ class Candidates {
   }
 
   // Returns the error with which each example in `of` is reproduced by the other examples in `of`.
+  // It is 0 if the weights cannot be solved.
   [[nodiscard]] std::vector<LeftOutError> LeaveOneOut(const std::vector<int>& of) {
     std::vector<LeftOutError> errors(of.size());
     ParallelFor(static_cast<int>(of.size()), 1, ThreadCount(0), [&](int k, int thread) {
@@ -116,7 +118,8 @@ Deviation DeviationOf(const std::vector<double>& values, double least) {
   return deviation;
 }
 
-// Removes the outliers from `left`, starting with the worst.
+// Removes the outliers from `left`, starting with the worst: at most one per kExamplesPerOutlier
+// examples, and only while at least kOutlierExamplesMin are left.
 void DropOutliers(const std::vector<GridExample>& examples, Candidates& candidates,
                   double deviations, std::vector<int>& left, GroupSelection& report) {
   const std::size_t most = examples.size() / kExamplesPerOutlier;

@@ -11,7 +11,8 @@ namespace stridewire {
 
 // The examples of a group to store, and why they were selected.
 struct Selected {
-  // Each cluster is stored as one example. Sorted by index.
+  // [stored example]: indices of the examples of which it is the average, in ascending order.
+  // Clusters are sorted by their first index.
   std::vector<std::vector<int>> clusters;
   std::vector<GridExample> examples;  // [cluster]
   GroupSelection report;  // Report of the selection. All members except `group` are set.
@@ -19,10 +20,10 @@ struct Selected {
 
 // Selects the examples of a group to store:
 //
-// 1. Drops outliers.
+// 1. Drops outliers, if SelectionOptions::outlier_deviations is above 0.
 // 2. Averages examples within `diameter` of each other.
-// 3. Starts with one average. Adds the average that the chosen ones reproduce worst, until all are
-//    reproduced within the error bound.
+// 3. If SelectionOptions::max_pose_error_m is above 0: Starts with one average. Adds the average
+//    that the chosen ones reproduce worst, until all are reproduced within the error bound.
 // 4. In the order in which they were added, removes averages that the others reproduce within the
 //    bound.
 //

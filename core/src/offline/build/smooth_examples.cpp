@@ -100,7 +100,8 @@ struct Kriging {
   }
 
   // Returns the weights [site] at p without site `left_out`. By block inversion, the inverse of the
-  // matrix without that site's row and column is the full inverse minus a product of the two.
+  // matrix without that site's row and column is the full inverse minus the product of that column
+  // and row of the inverse, divided by their common element.
   [[nodiscard]] Eigen::VectorXd WeightsWithout(Eigen::Index left_out,
                                                std::span<const double> p) const {
     Eigen::VectorXd functions = Functions(p);

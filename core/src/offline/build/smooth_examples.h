@@ -63,7 +63,8 @@ struct SmoothGroup {
 // Chooses the smoothness with which the examples reproduce each other best. For this purpose, each
 // example is left out in turn, and its parameters are projected onto the enlarged hull of the
 // others, as for requests. The root mean square distances of linearly blended joint positions are
-// summed. `products`: see MovementProducts. Returns nullopt if there are too few examples.
+// summed. `products`: see MovementProducts. Returns nullopt if there are too few examples, or if
+// the weights cannot be solved.
 [[nodiscard]] std::optional<Smoothness> ChooseSmoothness(const MotionGroup& group,
                                                          std::span<const int> examples,
                                                          std::span<const double> products);
@@ -72,11 +73,17 @@ struct SmoothGroup {
 // parameters. These movements are blends of all examples of the group. Their parameters are
 // measured again. `examples` must have the parameters and cells of the group.
 //
-// Returns nullopt and changes nothing if there are too few examples. An example whose parameters
-// cannot be reproduced within 0.1 mm remains unchanged.
+// Returns nullopt and changes nothing if there are too few examples, or if the weights cannot be
+// solved. An example whose parameters cannot be reproduced within 0.1 mm remains unchanged.
 std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLayout& layout,
                                          const Skeleton& skeleton,
                                          std::vector<GridExample>& examples);
+
+// The result of FitSmoothBasis.
+struct SmoothBasis {
+  CardinalBasis basis;
+  double radius_factor = 1.0;  // Factor by which the dilations are multiplied.
+};
 
 // Fits the weights of a library to smooth examples [count][d] with CardinalBasisFit. With three or
 // more parameters, the radii are multiplied by up to 1.5, as long as the sum of |w| at samples
@@ -84,10 +91,6 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
 // radii are necessary because few sites in many dimensions are far apart, except for the nearest
 // ones. With radii equal to the distance of the nearest site, only the linear part would act in
 // most of the hull.
-struct SmoothBasis {
-  CardinalBasis basis;
-  double radius_factor = 1.0;  // Factor by which the dilations are multiplied.
-};
 [[nodiscard]] Expected<SmoothBasis> FitSmoothBasis(std::span<const double> sites,
                                                    std::span<const double> scales);
 

@@ -11,12 +11,12 @@ namespace stridewire {
 // the world. Jolts are noise of the recording that remains if few examples are similar enough to be
 // averaged. They are visible as pops, especially where steps are played faster.
 //
-// - Rotations of a jolting joint are replaced with their Gaussian mean. The standard deviation
-//   grows from 0 until the acceleration is within the limit, or up to 60 ms. It varies gradually,
-//   so grid points further than 0.15 s from all jolts remain unchanged. The first and the last
-//   point remain unchanged as well.
-// - The children of a smoothed joint rotate with it. If they compensated its noise before, they
-//   jolt in the world afterwards, but by less than the limit.
+// - Rotations of a jolting joint are replaced with their Gaussian mean over time. The standard
+//   deviation grows from 0 until the acceleration is within the limit, or up to 60 ms. It decreases
+//   to 0 within 0.15 s of a jolt, so grid points further away from all jolts remain unchanged. The
+//   first and the last point remain unchanged as well.
+// - The children of a smoothed joint rotate with it. If they compensated its noise before, they may
+//   jolt in the world afterwards, and are then smoothed as well.
 // - The root and the legs are not smoothed, because they determine where feet stand. Fingers and
 //   thumbs are not smoothed either (see RemoveJointNoise).
 //
