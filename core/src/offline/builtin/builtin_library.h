@@ -30,18 +30,18 @@ inline constexpr Vec3 kBuiltinHeelOffsetM = Vec3(0.0f, -0.06825f, -0.06f);
 ///   up, down  30 each (start_y, start_z, end_y, end_z, turn): 0.125 and 0.25 m per foot, from
 ///             and to level ground and on stairs, turns of 35 degrees to both sides
 ///
-/// A state is a pose and a velocity in the middle of double support. It depends on the distance
+/// A state is a pose and a velocity in the middle of double support. It depends on the distances
 /// between the feet and on the style of the step (StepStyle). All examples that end in a state and
 /// do not turn have the same final pose. All examples that start in it have this pose as their
 /// initial pose (mirrored if the other foot leads). Steps of one style therefore follow each other
 /// without discontinuity.
 ///
-/// First the feet are placed: heel, flat foot, ball and toe tip are exactly fixed on the ground.
-/// Then the pelvis follows, then the legs by inverse kinematics, then the rest of the body. The set
-/// of steps is that of the paper, Section 6. Angles, timing and segments are rounded values from
-/// textbooks: Winter, Biomechanics and Motor Control of Human Movement; Perry and Burnfield, Gait
-/// Analysis. The code cites the sources of other numbers. The design is explained in
-/// docs/decisions/0036-the-generated-walk-follows-biomechanics.md.
+/// First the feet are placed. The part of a foot on which it stands (heel, sole, ball or toe tip)
+/// stays exactly fixed on the ground. Then the pelvis follows, then the legs by inverse kinematics,
+/// then the rest of the body. The set of steps is that of the paper, Section 6. Angles, timing and
+/// segments are rounded values from textbooks: Winter, Biomechanics and Motor Control of Human
+/// Movement; Perry and Burnfield, Gait Analysis. The code cites the sources of other numbers. The
+/// design is explained in docs/decisions/0036-the-generated-walk-follows-biomechanics.md.
 [[nodiscard]] RawLibrary GenerateBuiltinLibrary();
 
 }  // namespace stridewire

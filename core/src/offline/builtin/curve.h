@@ -5,9 +5,9 @@
 
 namespace stridewire::builtin {
 
-/// A C1 curve of cubic Hermite segments through knots. It is constant beyond its ends. A knot
-/// without a slope gets the slope that keeps the curve monotone between knots (PCHIP, Fritsch and
-/// Carlson 1980).
+/// A C1 curve of cubic Hermite segments through knots. It is constant beyond its ends. An inner
+/// knot without a slope gets the slope that keeps the curve monotone between knots (PCHIP, Fritsch
+/// and Carlson 1980). The first and the last knot get slope 0 by default.
 class Curve {
  public:
   struct Knot {

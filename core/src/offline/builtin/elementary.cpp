@@ -3,7 +3,8 @@
 namespace stridewire::builtin {
 
 double Exp(double x) {
-  // e^x = (e^(x/64))^64. The series converges fast because |x/64| <= 20/64.
+  // e^x = (e^(x/64))^64. The series converges fast for |x| <= 40, which includes the arguments 2x
+  // of Tanh.
   const double y = x / 64.0;
   double sum = 1.0;
   for (int n = 14; n >= 1; --n) sum = 1.0 + sum * y / n;

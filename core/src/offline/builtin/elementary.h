@@ -2,9 +2,9 @@
 
 namespace stridewire::builtin {
 
-/// exp and tanh, computed with exactly rounded operations only. They give the same bits on every
-/// machine, unlike those of C libraries, which differ in the last digit. The relative error is
-/// below 1e-13 for |x| <= 20.
+/// exp and tanh, computed with correctly rounded operations only. Their results have the same bits
+/// on every machine, while those of C libraries may differ in the last digit. For |x| <= 20, the
+/// relative error of Exp and the absolute error of Tanh are below 1e-13.
 [[nodiscard]] double Exp(double x);
 [[nodiscard]] double Tanh(double x);
 

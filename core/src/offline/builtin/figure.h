@@ -9,8 +9,9 @@
 
 namespace stridewire::builtin {
 
-/// The generated figure is H = 1.75 m tall. Segment lengths are fractions of H (Drillis and Contini
-/// 1966, in Winter, Biomechanics and Motor Control of Human Movement). Lengths are in metres.
+/// The generated figure is H = 1.75 m tall. Most segment lengths are fractions of H (Drillis and
+/// Contini 1966, in Winter, Biomechanics and Motor Control of Human Movement). Lengths are in
+/// metres.
 inline constexpr double kStatureM = 1.75;
 inline constexpr double kThighM = 0.245 * kStatureM;
 inline constexpr double kShankM = 0.246 * kStatureM;
@@ -26,7 +27,8 @@ inline constexpr double kDegree = 0.017453292519943295;
 inline constexpr double kToeOutRad = 6.0 * kDegree;
 
 /// Joints of the figure, with the names of the CMU captures. The ball of the foot is the toe joint.
-/// It is in the plane of the sole, so that a flat foot rotates about its contact point.
+/// It is in the plane of the sole, so that a foot whose heel rises rotates about a point on the
+/// ground.
 enum JointIndex : int {
   kHips,
   kLeftUpLeg,

@@ -33,7 +33,7 @@ DVec3 Forward(Foot foot, double yaw_rad = 0.0) {
   return {Sin(yaw), 0.0, Cos(yaw)};
 }
 
-// In a step from standing, the foot pushes off half as much, because the body is not moving yet.
+// In a step from standing, the foot pushes off less, because the body is not moving yet.
 double ToeOffPitch(const StepTiming& timing) {
   if (!timing.start.standing()) return timing.start.toe_off_pitch_rad;
   return 0.5 * 68.0 * kDegree * Tanh(0.5 * timing.end.length_m / 0.5);
@@ -49,7 +49,7 @@ Curve MakeFixedPitch(const StepTiming& timing) {
   const double at_strike = roll_off.strike * end.toe_off_pitch_rad;
   double strike_rate = 0.0;
   if (!end.standing()) {
-    // A steeper cubic curve would first lower the toes into the ground.
+    // A steeper cubic curve would first raise the toes.
     const double steepest = 3.0 * at_strike / (timing.heel_strike_s - heel_off_s);
     strike_rate =
         std::min(roll_off.strike_rate * end.toe_off_pitch_rad / end.half_support_s, steepest);
@@ -120,7 +120,8 @@ struct SwingEnd {
 };
 
 // Returns the position of a swinging foot along one axis, at the fraction `u` of its swing. As in
-// captured walks, the foot is fastest at 70 % of the swing and slows down just before it lands.
+// captured walks, the foot is fastest at about 70 % of the swing and slows down just before it
+// lands.
 double SwingAlong(double u, const SwingEnd& from, const SwingEnd& to) {
   const double path_m = to.position_m - from.position_m;
   return Curve({{0.0, from.position_m, from.velocity},
@@ -169,7 +170,7 @@ FootPaths::FootPaths(Foot moving, const StepTiming& timing)
       toe_bend_(MakeToeBend(timing)) {
   fixed_ball_m_ = DVec3(StandingBall(OtherFoot(moving)).x, 0.0, 0.0);
   // The lengths of the shape are distances between the balls at both ends of the step. There, the
-  // ball of the front foot is raised, and is thus further back than in a flat foot.
+  // ball of the front foot is raised, and is thus further back than if the foot were flat.
   const StepShape& shape = timing.shape;
   start_ball_m_ = fixed_ball_m_ + shape.start_m - DVec3(0.0, 0.0, timing.start.front_ball_back_m());
   end_ball_m_ = fixed_ball_m_ + RotateY(shape.turn_rad) *
@@ -241,7 +242,7 @@ FootPose FootPaths::Moving(double time_s) const {
 }
 
 // Returns the height of the ground at z. The ground has three levels: where the moving foot starts,
-// below the fixed foot, and where the moving foot lands.
+// under the fixed foot, and where the moving foot lands.
 double FootPaths::GroundAt(double z_m) const {
   const auto edge = [](const DVec3& behind, const DVec3& ahead) {
     return behind.y < ahead.y ? ahead.z - kEdgeBehindBallM : behind.z + kEdgeAheadOfBallM;

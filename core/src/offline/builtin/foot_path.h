@@ -19,13 +19,15 @@ struct FootPose {
 /// Returns the rotation of a foot, or of its toes, with this pitch.
 [[nodiscard]] DQuat FootRotation(Foot foot, double pitch_rad, double yaw_rad = 0.0);
 
-/// Returns the pose of a foot on the ground whose ball would be at `flat_ball_m` if it were flat.
-/// The foot is rotated about the heel for pitch > 0 and about the ball for pitch < 0. If
-/// `toe_rock_rad` > 0, the ball is lifted about the toe tip. The contact point stays exactly fixed.
+/// Returns the pose of a foot on the ground. Its ball would be at `flat_ball_m` if the foot were
+/// flat. The foot is rotated about the heel for pitch > 0 and about the ball for pitch < 0. If
+/// `toe_rock_rad` > 0, the ball is lifted about the toe tip. The contact point (heel, ball or toe
+/// tip) stays exactly fixed.
 [[nodiscard]] FootPose FootOnGround(Foot foot, const DVec3& flat_ball_m, double pitch_rad,
                                     double toe_rock_rad, double yaw_rad = 0.0);
 
-/// Returns the position of the ball of a flat foot below a hip at x = 0, z = 0.
+/// Returns the position of the ball of a flat foot in the stand, with the ankle at z = 0 and
+/// kAnkleHalfWidthM to its side of x = 0.
 [[nodiscard]] DVec3 StandingBall(Foot foot);
 
 /// The motion of both feet in a step. The ball of the fixed foot, when flat, is at y = z = 0.
@@ -44,7 +46,8 @@ class FootPaths {
   [[nodiscard]] FootPose Fixed(double time_s) const;
   [[nodiscard]] FootPose Moving(double time_s) const;
 
-  /// Balls of the fixed foot, and of the moving foot before its swing, when these feet are flat.
+  /// Positions that the balls of the fixed foot, and of the moving foot before its swing, have when
+  /// these feet are flat.
   [[nodiscard]] const DVec3& fixed_ball_m() const { return fixed_ball_m_; }
   [[nodiscard]] const DVec3& start_ball_m() const { return start_ball_m_; }
 

@@ -12,7 +12,8 @@
 namespace stridewire::builtin {
 namespace {
 
-// Additional pitch of the foot at toe-off per metre of height difference between the feet.
+// Additional pitch of the foot at toe-off, in degrees, per metre of height difference between the
+// feet.
 constexpr double kRiseHeel_deg_m = 60.0;
 constexpr double kMinStairsStepS = 0.72;
 // Additional duration of a step in seconds per metre of height difference.
@@ -51,7 +52,8 @@ RollOff RollOffOf(double length_m, StepStyle style) {
     case StepStyle::kStairs: return kStairsRollOff;
     case StepStyle::kStraight: break;
   }
-  // In long steps, the heel rises earlier, because a flat foot cannot stay as far behind the body.
+  // In long steps, the heel is higher when the other foot lands, because a flat foot cannot stay as
+  // far behind the body.
   RollOff roll_off = kStraightRollOff;
   const double long_step = std::clamp((length_m - 0.55) / 0.2, 0.0, 1.0);
   roll_off.strike += 0.15 * long_step;

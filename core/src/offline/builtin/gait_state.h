@@ -49,13 +49,14 @@ struct GaitState {
   double length_m = 0.0;
   /// Time from heel-strike to the state, and from the state to toe-off.
   double half_support_s = 0.0;
-  double step_s = 0.0;            ///< Duration of a steady step between two such states.
-  double speed_mps = 0.0;         ///< Forward speed of the pelvis.
-  double vigour = 0.0;            ///< min(1, speed / 1.4 m/s). Scales the motion of the upper body.
-  double strike_pitch_rad = 0.0;  ///< a.
+  double step_s = 0.0;     ///< Duration of a steady step between two such states.
+  double speed_mps = 0.0;  ///< Forward speed of the pelvis.
+  /// min(1, mean speed of the step / 1.4 m/s). Scales the motion of the pelvis and the upper body.
+  double vigour = 0.0;
+  double strike_pitch_rad = 0.0;   ///< a.
   double toe_off_pitch_rad = 0.0;  ///< b, positive.
   RollOff roll_off{};
-  double pelvis_drop_m = 0.0;  ///< Height by which the pelvis is lower than in standing.
+  double pelvis_drop_m = 0.0;  ///< Distance by which the pelvis is lower than when standing.
   /// Distance of the pelvis in front of the ankle of the rear foot, assuming that this foot is
   /// flat.
   double pelvis_ahead_m = 0.0;
@@ -71,7 +72,8 @@ struct GaitState {
   [[nodiscard]] double rear_pitch_rate() const;
   /// Angle of the toes about their tip at toe-off.
   [[nodiscard]] double toe_rock_rad() const { return roll_off.toe_rock * toe_off_pitch_rad; }
-  /// Returns the distance by which the ball of the front foot moves back because it is raised.
+  /// Returns the distance by which the raised ball of the front foot is further back than if the
+  /// foot were flat.
   [[nodiscard]] double front_ball_back_m() const;
 };
 

@@ -8,7 +8,8 @@ namespace stridewire::builtin {
 // Each function adds a group of left steps and a group of their mirror images to `library`. The
 // comments list the parameters of the groups.
 
-/// Parameters: start_z, end_z. Must be called before the other functions.
+/// Parameters: start_z, end_z. Call it first, so that the groups of straight steps are the first of
+/// the library.
 void AddStraightSteps(RawLibrary& library);
 void AddBackwardSteps(RawLibrary& library);  ///< Parameters: start_z, end_z.
 void AddTurningSteps(RawLibrary& library);   ///< Parameters: start_x, start_z, end_z, turn.

@@ -20,7 +20,7 @@ std::size_t ShoulderOf(Foot side) { return side == Foot::kLeft ? kLeftShoulder :
 
 // Angles of an arm in radians: raised forwards (flexion) and sideways (abduction), rotated about
 // its own axis, and bent at elbow and wrist. At outward_turn 0 the elbow bends forwards. A positive
-// outward_turn makes it bend upwards.
+// outward_turn makes it bend upwards. collar_lift raises the collar bone.
 struct ArmAngles {
   double flexion = 0.0;
   double abduction = 0.0;
@@ -59,7 +59,7 @@ FigurePose Waving(double phase) {
 }
 
 // Returns the pose at a phase of the loop. The forearms are level, the hands are apart by the width
-// of a box, and the back leans against the load. The figure breathes.
+// of a box, and the back leans backwards to balance the load. The figure breathes.
 FigurePose Carrying(double phase) {
   const double breath = Sin(kTwoPi * phase);
   FigurePose pose;

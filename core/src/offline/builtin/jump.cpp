@@ -101,7 +101,7 @@ class JumpPath {
 
   void PlanFeet() {
     const double push_s = toe_off_s() - lowest_s();
-    // The ankles extend last. At toe-off they rise almost as fast as the body.
+    // The ankles extend last. At toe-off, they rise at three quarters of the speed of the body.
     toe_off_pitch_rad_ = (36.0 + 11.0 * length_m_) * kDegree;
     const double rate = 0.75 * velocity_.y / kBallAheadOfAnkleM;
     push_pitch_ = Curve({{0.0, 0.0, 0.0},
@@ -119,7 +119,8 @@ class JumpPath {
     // Measures z from the balls of the feet.
     rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;
 
-    // At toe-off the centre is ahead of the balls and as high as the legs allow.
+    // At toe-off, the centre of mass is ahead of the balls of the feet. It is as high as knees with
+    // the bend kToeOffKneeRad allow.
     const double toe_off_z = -0.02 + 0.19 * length_m_;
     const double low = CentreHeightAtKnee(toe_off_s(), toe_off_z, kToeOffKneeRad);
     toe_off_centre_ = DVec3(0.0, low, toe_off_z);

@@ -10,7 +10,7 @@ namespace stridewire::builtin {
 [[nodiscard]] double ReachAtKnee(double knee_rad);
 
 /// Returns the maximum height of a hip, on the vertical line through `hip_m`, at which it is at
-/// most `reach_m` from the ankle.
+/// most `reach_m` from the ankle. Returns the height of the ankle if that line is further away.
 [[nodiscard]] double HighestHipM(const DVec3& hip_m, const DVec3& ankle_m, double reach_m);
 
 /// Sets the rotations of hip, knee, ankle and toe joint of one leg so that the foot has the pose

@@ -15,8 +15,8 @@ namespace {
 constexpr int kSamples = 161;
 constexpr double kMinKneeRad = 6.0 * kDegree;  // Minimum bend of the knees.
 // Amplitudes at 1.4 m/s. Perry and Burnfield, Gait Analysis, give 5 degrees of yaw and 4 of
-// obliquity to each side. The amplitudes are slightly larger, because blended steps lose a part of
-// them.
+// obliquity (roll) to each side. The amplitudes are slightly larger, because blended steps lose a
+// part of them.
 constexpr double kYawRad = 6.5 * kDegree;
 constexpr double kRollRad = 4.8 * kDegree;
 constexpr double kTiltRad = 1.5 * kDegree;
@@ -227,9 +227,9 @@ void PelvisPath::StayWithinReach(const FootPaths& feet) {
     }
     const std::vector<double> smooth = MovingMean(MovingMaximum(missing, kMaximumHalf), weights);
     for (int i = 0; i < kSamples; ++i) {
-      // The pelvis is not lowered at both ends of a step, because successive steps have the same
-      // pose there. A step that turns may lower the pelvis at its end: its last pose differs from
-      // the first pose of the next step anyway, because the rear foot points in another direction.
+      // The pelvis is lowered at neither end of a step, because successive steps have the same pose
+      // there. A step that turns may lower the pelvis at its end: its last pose differs from the
+      // first pose of the next step anyway, because the rear foot points in another direction.
       const int to_state = timing_.shape.turn_rad == 0.0 ? std::min(i, kSamples - 1 - i) : i;
       const auto k = static_cast<std::size_t>(i);
       lowered_m_[k] += smooth[k] * SmoothStep(to_state / (0.06 * (kSamples - 1)));

@@ -16,11 +16,12 @@ namespace stridewire::builtin {
 /// `end_length_m` apart at its end.
 [[nodiscard]] StepShape StraightShape(Foot moving, double start_length_m, double end_length_m);
 
-/// Generates a step with the parameters `names`. It starts at the origin with heading 0.
+/// Generates a step that starts at the origin with heading 0. The example stores the parameters
+/// `names`.
 [[nodiscard]] RawExample MakeStep(const Skeleton& figure, Foot moving, const StepShape& shape,
                                   std::span<const ParameterName> names, std::string source);
 
-/// Returns the standing pose: the state of length 0 with the root at x = z = 0.
+/// Returns the standing pose (the GaitState of length 0, gait_state.h), with the root at x = z = 0.
 [[nodiscard]] FigurePose StandingPose();
 
 }  // namespace stridewire::builtin

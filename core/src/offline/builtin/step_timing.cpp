@@ -30,7 +30,8 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   const double weight_shift_s = in_place ? 0.20 : 0.27;
   const double settling_s = 0.12 * step_s + (in_place ? 0.10 : 0.15);
   timing.toe_off_s = timing.start.standing() ? weight_shift_s : timing.start.half_support_s;
-  // In steps from or to a stand, the swing takes the same fraction of the step as in slow walking.
+  // At the standing end of a step, the part that corresponds to half of double support is the same
+  // fraction of the step as in walking at 1.3 m/s.
   const auto half_support_s = [&](const GaitState& state) {
     return state.standing() ? 0.12 * step_s : state.half_support_s;
   };

@@ -32,7 +32,8 @@ struct Oscillation {
   double lag = 0.0;  // Time from the state to an extreme, as a fraction of a step.
 };
 
-// Returns the slope of cos(2 pi cycles (u - lag)) at u = 0, per second.
+// Returns the slope of amplitude * cos(2 pi cycles (u - lag)) at u = 0, per second. u is the time
+// as a fraction of a step.
 double SlopeOf(const Oscillation& oscillation, double cycles, const GaitState& state) {
   if (state.standing()) return 0.0;
   const double angle = 2.0 * kPi * cycles;

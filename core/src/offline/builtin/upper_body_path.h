@@ -10,7 +10,7 @@ namespace stridewire::builtin {
 /// The motion of trunk, head and arms over a step, except for the yaw of the head, which depends on
 /// the heading of the pelvis.
 ///
-///   thorax yaw   opposite to the pelvis, later by a sixth to a third of a step
+///   thorax yaw   opposite to the pelvis, later by 18 to 36 % of a step
 ///   lean         grows with speed, ascent and acceleration; largest in double support
 ///   roll         towards the standing leg
 ///   arms         opposite to the legs; the elbows are later than the shoulders
