@@ -11,7 +11,7 @@ namespace stridewire {
 [[nodiscard]] double Sin(double x_rad);
 [[nodiscard]] double Cos(double x_rad);
 
-/// Angle of the vector (x, y) in (-pi, pi]. Returns 0 for (0, 0).
+/// Angle of the vector (x, y) in [-pi, pi]. Returns 0 for (0, 0).
 [[nodiscard]] double Atan2(double y, double x);
 
 /// acos(x) in [0, pi]. An x outside [-1, 1] is clamped to that range.

@@ -88,7 +88,8 @@ LegRig RigOf(const RawLibrary& library) {
   return MakeLegRig(library.skeleton, library.stand_pose, hinges);
 }
 
-// LibraryBuilder bends the toes of captured steps, so generated steps must follow bent toes too.
+// Returns the library with toes bent as by LibraryBuilder, so that generated steps resemble the
+// captured steps in the built library.
 RawLibrary WithBentToes(RawLibrary library) {
   const ToeBender toes(library);
   for (RawGroup& group : library.groups) {

@@ -18,8 +18,8 @@ struct Completion {
   /// True if the stand pose was composed because none was captured.
   bool has_composed_stand = false;
   std::string stand_reason;  ///< Reason why the stillest captured pose is not a stand.
-  /// True if the captures contain no level stride straight ahead. The generated steps then follow
-  /// the strides of the library `builtin`.
+  /// True if the captures do not contain level strides straight ahead for both feet. Mirror images
+  /// count. The generated steps then follow the strides of the library `builtin`.
   bool has_generic_strides = false;
   std::optional<Foot> only_foot;  ///< The moving foot, if it is the same in all captured steps.
   std::string failure;  ///< Why no steps could be generated. Empty if there was no failure.
@@ -27,9 +27,10 @@ struct Completion {
 
 /// Completes a library with steps that its captures lack: starts, stops, small steps, turns on the
 /// spot and while walking, steps sideways and steps backward. Generated steps have the proportions,
-/// the posture and the cadence of the captured person. They begin and end in the poses of captured
-/// strides or in the stand pose. If one step of a kind is lacking, for example a turn to the left,
-/// all basic steps of this kind are generated for both feet. The function adds neither climbing
+/// the posture and the cadence of the captured person. They begin and end in the stand pose, in
+/// poses of the captured strides, or between the two. There are four groups of basic steps:
+/// straight, backward, turning and sideways. If one step of a group is lacking, for example a turn
+/// to the left, the whole group is generated for both feet. The function adds neither climbing
 /// steps nor jumps.
 ///
 /// Generated steps form separate groups (RawGroup::is_completed) after the captured groups, which

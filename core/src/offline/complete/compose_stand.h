@@ -17,15 +17,15 @@ namespace stridewire::complete {
 
 /// Parts of a stand pose, as measured in a walk.
 struct StandParts {
-  PostureSample mean;                ///< Mean posture. Its root and feet are not used.
-  std::array<DQuat, 2> ankles;       ///< [Foot]: rotation of the ankle while the sole is flat.
+  PostureSample mean;           ///< Mean posture. `root_m`, `ankles` and `balls_m` are not used.
+  std::array<DQuat, 2> ankles;  ///< [Foot]: rotation of the ankle while the sole is flat.
   std::array<double, 2> ball_y_m{};  ///< [Foot]: height of the ball while the sole is flat.
   double width_m = 0.0;              ///< Sideways distance between the feet.
 };
 
 /// Measures the parts of a stand in the mean strides of both feet. The average over both strides
-/// cancels the swings of arms and pelvis. The sole of the fixed foot is flat in the middle of
-/// single support.
+/// cancels the swings of arms and pelvis. The sole of the fixed foot is flat while the other foot
+/// swings past it.
 [[nodiscard]] StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides);
 
 /// Measures the parts of a stand in all captured steps, for libraries without level, straight

@@ -12,7 +12,7 @@
 namespace stridewire::complete {
 namespace {
 
-// A step this close to the captured ones counts as captured.
+// A step this close to the enlarged hull of captured steps counts as captured.
 constexpr double kCloseM = 0.06;
 // Sideways tolerance of groups without sideways parameters.
 constexpr double kSideSlackM = 0.12;

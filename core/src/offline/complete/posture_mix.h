@@ -11,8 +11,8 @@
 
 namespace stridewire::complete {
 
-/// A pose in double precision, with the positions of its feet for inverse kinematics. World
-/// rotations are relative to the heading.
+/// A pose in double precision, with the positions of its feet for inverse kinematics. Positions and
+/// world rotations are relative to the heading.
 struct PostureSample {
   DVec3 root_m = DVec3(0.0);
   /// [joint]: rotation relative to the parent or, for the root, to the heading.
@@ -32,14 +32,15 @@ struct PostureSample {
   return length > 1e-9 ? sum * (1.0 / length) : a;
 }
 
-/// Returns a + share (b - a) for every member of two samples.
+/// Blends all members of two samples: positions linearly, and rotations as above.
 [[nodiscard]] PostureSample Blend(const PostureSample& a, const PostureSample& b,
                                   double share_of_b);
 
 /// Writes the blend of two samples to `out`, whose memory it reuses. `out` may be `a` or `b`.
 void Blend(const PostureSample& a, const PostureSample& b, double share_of_b, PostureSample& out);
 
-/// Blends only the root and the feet of two samples, and writes them to `out`.
+/// Blends only the root position and the feet of two samples. Does not change the rotations of
+/// `out`.
 void BlendFeet(const PostureSample& a, const PostureSample& b, double share_of_b,
                PostureSample& out);
 
@@ -50,8 +51,7 @@ void BlendFeet(const PostureSample& a, const PostureSample& b, double share_of_b
 /// Returns the position of the root relative to the ground below the midpoint between the balls.
 [[nodiscard]] DVec3 RootFromFeet(const PostureSample& sample);
 
-/// Returns the distance from hip to ankle with which the ball of the foot is at its position in the
-/// sample.
+/// Returns the distance from hip to ankle if the ball of the foot is at its position in the sample.
 [[nodiscard]] double LegLength(const Skeleton& skeleton, const LegRig& rig,
                                const PostureSample& sample, Foot foot);
 

@@ -28,7 +28,7 @@ constexpr double kReachFps = 60.0;
 // momentum. Steps that end in a stand end with settling.
 constexpr double kWeightShiftS = 0.28;
 constexpr double kSettleS = 0.24;
-// Duration of the weight shift for steps that begin and end in a stand, such as turns on the spot.
+// The same durations for steps that begin and end in a stand, such as turns on the spot.
 constexpr double kWeightShiftInPlaceS = 0.18;
 constexpr double kSettleInPlaceS = 0.15;
 constexpr double kMinSwingS = 0.36;
@@ -49,8 +49,8 @@ constexpr double kSwingRounding = 0.02;
 // Minimum weight of the captured stride in the middle of a swing, for the rotation and the height
 // of the foot. It prevents feet from dragging along the ground in short steps.
 constexpr double kMinSwingShare = 0.45;
-// Minimum heights of the ball and of the toe tip during a swing. The foot is lifted by up to
-// kMaxLiftM to reach them.
+// Minimum heights of the ball and of the toe tip above their heights in the stand pose, from 30 %
+// of the swing on. The foot is lifted by up to kMaxLiftM to reach them.
 constexpr double kClearanceM = 0.026;
 constexpr double kTipClearanceM = 0.022;
 constexpr double kMaxLiftM = 0.12;
@@ -153,7 +153,8 @@ class StepGenerator {
   }
 
  private:
-  // State of a foot at one time. Positions are relative to the ball of the fixed foot.
+  // State of a foot at one time. Horizontal positions are relative to the ball of the fixed foot,
+  // heights to the ground.
   struct FootState {
     DQuat ankle_rotation;       // World rotation of the ankle.
     DVec3 ball_m = DVec3(0.0);  // Without the detour and the lift, which BallOf adds.

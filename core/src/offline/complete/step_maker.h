@@ -53,8 +53,9 @@ struct StepSpec {
 /// the blend. Finally, inverse kinematics sets the legs, and toes bend where they would be in the
 /// ground (RaiseToeTip).
 ///
-/// A step backward is a forward step from `feet.end_m` to `feet.start_m`, played in reverse. Its
-/// moving foot is in front in `feet.start_m` and behind in `feet.end_m`, and it does not turn.
+/// A step backward is a forward step from `feet.end_m` to `feet.start_m`, played more slowly and in
+/// reverse. Its moving foot is in front in `feet.start_m` and behind in `feet.end_m`, and it does
+/// not turn.
 ///
 /// `cells` [interval] is the grid of the step's group (CellsAtRate). The example has a frame at
 /// each grid point, so that LibraryBuilder stores the frames without interpolation. `names` selects

@@ -271,7 +271,7 @@ void JoinStrides(std::array<StrideModel, 2>& strides) {
       point.root_m += weight * kShare * (RootFromFeet(to) - RootFromFeet(from));
     };
     // The correction fades out over the fraction kFadePart of the stride's duration, and not over a
-    // fraction of its points. Points are not evenly spaced in time: a third of them is in the
+    // fraction of its points. Points are not evenly spaced in time: a third of them are in the
     // double support at each end of the stride, which may be very short.
     const auto weight_at = [](const StrideModel& stride, std::size_t point, double end_s) {
       const double fade_s = kFadePart * (stride.keytimes_s.back() - stride.keytimes_s.front());

@@ -43,7 +43,8 @@ struct StrideModel {
   void Sample(double generic_time, PostureSample& out) const;
   /// Same, but writes only the root, the feet and the rotations of `joints`.
   void Sample(double generic_time, std::span<const std::size_t> joints, PostureSample& out) const;
-  /// Return the velocities of the root at the start and at the end of the mean stride, in m/s.
+  /// Return the velocities of the root at the start and at the end of the mean stride, in m/s. They
+  /// are averages over half of the first and half of the last keytime interval.
   [[nodiscard]] DVec3 MeasuredStartVelocity() const;
   [[nodiscard]] DVec3 MeasuredEndVelocity() const;
 };
