@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Demonstrates Stridewire on a bare Debian 12. The script installs packages, builds the programs and
-# starts a server with three worlds. A simulated game server moves avatars in two of the worlds, and
-# a recorder writes one avatar of each to a BVH file. Finally the script prints the address of the
-# viewer, a web page that shows the avatars.
+# starts a server with three worlds. In two of the worlds, a simulated game server moves avatars and
+# a recorder writes one of them to a BVH file. Finally the script prints the address of the viewer,
+# a web page that shows the avatars.
 #
 #   deploy/demo.sh                   # run until Ctrl-C
 #   deploy/demo.sh --seconds 30      # stop after 30 seconds
@@ -14,8 +14,8 @@
 #
 # World "generated" uses the library that Stridewire generates itself. World "captured" uses a
 # library built from the two motion captures in Debian's package assimp-testmodels. With --library,
-# this second world is named "given". World "slabs" has uneven ground, and no avatars at first.
-# The script writes all its files to build/demo.
+# this second world is named "given". World "slabs" has uneven ground, and no avatars at first. The
+# script writes recordings, logs and settings to build/demo.
 set -euo pipefail
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
