@@ -51,7 +51,8 @@ class ToeBender {
   // is a little lower in the stand pose, uses its height there. Returns nullopt if the other foot
   // swings in no captured step.
   [[nodiscard]] std::optional<RestingFoot> MeasureFoot(const RawLibrary& library, Foot foot) const;
-  // Returns the height of the resting ball of a foot at an end of an example, whose pose is `end`.
+  // Returns the height at which the ball of a foot rests at an end of an example, whose pose is
+  // `end`: RestingFoot::ball_height_m, or the actual height if the foot is not on level ground.
   [[nodiscard]] double BallHeightAt(Foot foot, ConstPoseSpan end) const;
   template <typename PoseAt, typename TimeAt>
   void BendFrames(MovementKind kind, std::span<const double> keytimes_s, int count, PoseAt pose_at,

@@ -19,7 +19,8 @@ struct ErrorMapOptions {
 };
 
 /// The error e(p) = |p - a(p)| on a grid over a slice of the parameter space of a group (paper,
-/// Figure 1). The grid covers the range of the examples. Values outside their hull are NaN.
+/// Figure 1). a(p) are the measured parameters of the movement synthesized for p. The grid covers
+/// the range of the examples. Values outside their hull are NaN.
 struct ErrorMap {
   /// Values of the parameters on the axes, by column and by row. If axis_y is -1, `y` contains only
   /// 0.

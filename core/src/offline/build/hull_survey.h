@@ -12,8 +12,9 @@
 
 namespace stridewire {
 
-// Samples the hull of the examples of a group. Returns the examples first, and then convex
-// combinations: half of them of all examples, half of a few examples, to reach faces and corners.
+// Samples the hull of the examples of a group. Returns the examples first, and then `samples`
+// random convex combinations. Half of these combine all examples. The others combine at most d + 1
+// of them, where d is the number of parameters, to reach faces and corners of the hull.
 [[nodiscard]] std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples,
                                                       std::uint32_t seed);
 

@@ -7,7 +7,7 @@
 namespace stridewire {
 
 /// The error of synthesized movements, e(p) = |p - a(p)| (paper, Section 4), over the hull of the
-/// examples of a group.
+/// examples of a group. a(p) are the measured parameters of the movement for p.
 struct InterpolationError {
   double min_m = 0.0;
   double mean_m = 0.0;

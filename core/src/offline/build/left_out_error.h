@@ -15,7 +15,7 @@ struct LeftOutError {
   double pose_m = 0.0;  // Mean distance of joints at equal generic times.
   // Distance of the example's parameters from the hull of the set, enlarged by 10 %.
   double miss_m = 0.0;
-  double outside_m = 0.0;   // Distance of the example's parameters from the original hull.
+  double outside_m = 0.0;   // Distance of the example's parameters from the hull, not enlarged.
   double duration_s = 0.0;  // Synthesized duration minus original duration.
   [[nodiscard]] double worst_m() const { return pose_m > miss_m ? pose_m : miss_m; }
 };

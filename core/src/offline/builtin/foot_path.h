@@ -27,7 +27,7 @@ struct FootPose {
                                     double toe_rock_rad, double yaw_rad = 0.0);
 
 /// Returns the position of the ball of a flat foot in the stand, with the ankle at z = 0 and
-/// kAnkleHalfWidthM to its side of x = 0.
+/// kAnkleHalfWidthM to the left or right of x = 0.
 [[nodiscard]] DVec3 StandingBall(Foot foot);
 
 /// The motion of both feet in a step. The ball of the fixed foot, when flat, is at y = z = 0.

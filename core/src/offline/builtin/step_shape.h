@@ -7,8 +7,8 @@ namespace stridewire::builtin {
 /// Style of a step: how the feet roll over the ground and how fast the body moves.
 enum class StepStyle {
   kStraight,
-  /// Turning and sideways steps. The heel rises more slowly than in straight steps. A few examples
-  /// must cover many parameters, and blends of fast motion are less accurate.
+  /// Turning and sideways steps. The heel rises more slowly than in straight steps, because few
+  /// examples must cover many parameters, and blends of fast motion are less accurate.
   kGeneral,
   /// Steps with height differences. They are slower. In the middle of double support the front foot
   /// is flat, so the height difference of the balls is that of the ground. In the other styles, the

@@ -45,9 +45,9 @@ void TurnUpperBody(const Skeleton& skeleton, const UpperBodyChains& chains,
 void SwingArm(const Skeleton& skeleton, const UpperBodyChains::UpperArm& arm, double forward_rad,
               PostureSample& sample);
 
-/// Returns a posture whose trunk leans no further forward or back than that of a person who walks.
-/// Head and arms keep their directions. If the arms were not found, the lean cannot be measured,
-/// and the posture is returned unchanged.
+/// Returns a posture whose trunk leans forward by at most 6 degrees and back by at most 4, which
+/// suits a stand and a walk. Head and arms keep their directions. If the arms were not found, the
+/// lean cannot be measured, and the posture is returned unchanged.
 [[nodiscard]] PostureSample LimitLean(const Skeleton& skeleton, const UpperBodyChains& chains,
                                       const PostureSample& sample);
 
