@@ -1,6 +1,6 @@
 // Measures movement mode in Chromium without drawing: a page that observes walking avatars and
 // samples all of them 30 times per second. Prints processor time per frame, bytes per pose, and
-// memory at intervals.
+// memory at intervals: the heap of JavaScript and the memory of the WebAssembly module.
 //
 //   STRIDEWIRE_BIN=../../build/release/bin node test/measure_movement.mjs [AVATARS [MINUTES]]
 //
@@ -42,9 +42,17 @@ const script = await esbuild.build({
   },
   bundle: true, format: 'esm', target: 'es2022', write: false,
 });
+// The first script finds the memory of the client's WebAssembly module, which is not exported.
+const pageHtml = `<script>
+  WebAssembly.Instance = new Proxy(WebAssembly.Instance, {construct(target, args) {
+    const instance = new target(...args);
+    globalThis.moduleMemory ??= instance.exports.memory;
+    return instance;
+  }});
+</script><script type="module" src="/s.js"></script>`;
 const listener = http.createServer(({url}, response) => {
   response.writeHead(200, {'Content-Type': url === '/' ? 'text/html' : 'text/javascript'});
-  response.end(url === '/' ? '<script type="module" src="/s.js"></script>' :
+  response.end(url === '/' ? pageHtml :
     url === '/s.js' ? script.outputFiles[0].contents : '');
 });
 listener.listen(0, '127.0.0.1');
@@ -106,9 +114,11 @@ try {
   const memory = async () => {
     await page.send('HeapProfiler.collectGarbage');
     const {usedSize, backingStorageSize = 0} = await page.send('Runtime.getHeapUsage');
-    return (usedSize + backingStorageSize) / 1e6;
+    const moduleBytes = await page.evaluate(() => globalThis.moduleMemory.buffer.byteLength);
+    const text = (bytes) => (bytes / 1e6).toFixed(1);
+    return `${text(usedSize + backingStorageSize)} + ${text(moduleBytes)} MB`;
   };
-  console.log(`${avatars} avatars, mode ${mode}: ${(await memory()).toFixed(1)} MB`);
+  console.log(`${avatars} avatars, mode ${mode}: ${await memory()}`);
   for (let minute = 1; minute <= minutes; ++minute) {
     const [before, usedS] = [await state(), await processorS()];
     await sleep(60);
@@ -119,7 +129,7 @@ try {
       `${(1000 * frames / (after.ms - before.ms)).toFixed(1)} frames/s, ` +
       `${((after.poseBytesReceived - before.poseBytesReceived) / poses).toFixed(2)} bytes/pose, ` +
       `${(1000 * poses / (after.ms - before.ms)).toFixed(0)} poses/s, ` +
-      `${(await memory()).toFixed(1)} MB`);
+      await memory());
   }
 } finally {
   await browser.close();

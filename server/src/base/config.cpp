@@ -277,7 +277,8 @@ std::vector<ConfigKey> MakeKeys() {
         &Limits::messages_per_s, 1, 100'000'000);
   limit("max_pending_commands", "Unanswered commands per session; reading pauses at this number",
         &Limits::max_pending_commands, 1, static_cast<int>(protocol::kReplyCache));
-  limit("control_buffer_bytes", "Waiting outgoing messages per session, without poses, in bytes",
+  limit("control_buffer_bytes",
+        "Waiting outgoing messages per session, without poses and movements, in bytes",
         &Limits::control_buffer_bytes, std::size_t{64 * 1024}, 1024 * kMiB);
   limit("observer_backlog_ticks",
         "Waiting pose batches of a slow observer, per world, mode and shard",

@@ -81,7 +81,7 @@ struct AvatarEvent {
   /// Time of the event in seconds since the construction of the avatar.
   double time_s = 0.0;
   ParameterValues requested;  ///< kStarted: parameters as requested.
-  /// kStarted: parameters after clamping to the range of the examples.
+  /// kStarted: parameters after clamping to the hull of the examples, enlarged by 10 %.
   ParameterValues applied;
   bool extrapolated = false;  ///< kStarted: `applied` is outside the hull of the examples.
   /// kStarted: `applied` differs from `requested`, and planting does not reach the requested

@@ -72,6 +72,7 @@ class BasicStepList {
   }
   // Start and End return the vector from the fixed to the moving foot. The moving foot is
   // `length_m` behind the fixed foot at the start of a step, and `length_m` ahead of it at the end.
+  // In short steps, both positions are shifted forward by StandOffset.
   [[nodiscard]] DVec3 Start(double length_m, double width_m) const {
     return {SideSign(foot_) * width_m, 0.0, StandOffset(length_m) - length_m};
   }

@@ -44,9 +44,10 @@ struct SelfCheck {
 ///                between, and miss this length by at most 0.2 m.
 ///   stop         A stand after these steps brings the feet together: measured forward, they are
 ///                within 3 cm of their positions in the stand pose.
-///   walk_to      A walk to a goal 3 m straight ahead arrives. If the library has no stop, the walk
-///                ends within half a step of the goal.
-///   knees        Knees bend forward: bent legs deviate at most 60 degrees from their feet.
+///   walk_to      A walk to a goal 3 m straight ahead ends within 5 cm of it. If the library has
+///                no stop, the walk ends within half a step of the goal.
+///   knees        Knees bend forward: bent knees point at most 60 degrees away from the direction
+///                of their feet.
 ///   soles        Soles of standing feet are at most 1 cm above the ground, and the ball of a foot
 ///                is never more than 1 cm below it.
 ///

@@ -254,10 +254,10 @@ class Planner {
     return raise_m;
   }
 
-  // Returns the height to add to the moving foot of a step between the end of the blend-in and its
-  // release, so that its sole stays on the ground at height `ground_m`. `start_m` is the height
-  // that is added at the start, and `settled_m` is the height that would be added at the end of the
-  // blend-in without levelling.
+  // Keeps the sole of the moving foot on the ground, at height `ground_m`, until the foot is
+  // released. Returns the height offset of the foot from the end of the blend-in until its release.
+  // `start_m` is the offset at the start of the step. `settled_m` is the offset at the end of the
+  // blend-in before this correction.
   double ReleaseHeight(Foot moving, double ground_m, double start_m, double settled_m) const {
     const auto settled_at = [&](double time_s) {
       return 1.0 - EaseOut((time_s - movement_.start_offset_s) / movement_.ease_out_s);
@@ -356,8 +356,8 @@ class Planner {
         lift.max_m =
             std::min(lift.max_m, (kMaxHoverM - raised_m - feet.LowestSole(at, foot)) / share);
       }
-      // If no lift prevents both sinking and hovering, `lift` is an empty range. The lift is then
-      // between its two limits, and as small as possible.
+      // If no lift prevents both sinking and hovering, lift.min_m exceeds lift.max_m. The foot then
+      // gets the smallest lift between these two values.
       const auto [least, most] = std::minmax(lift.min_m, lift.max_m);
       trajectory.settle_lift_m = std::clamp(stays ? 0.0 : std::max(least, 0.0), least, most);
     }

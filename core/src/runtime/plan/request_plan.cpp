@@ -38,9 +38,10 @@ constexpr double kStraightPreferenceM = 0.15;
 // Additional cost of a group whose steps were generated because the captures lack them. Captured
 // steps are preferred if they fit nearly as well.
 constexpr double kCompletedCostM = 0.02;
-// In libraries with generated groups (MotionGroup::is_completed), captured groups have an
-// additional cost far from their examples. With few examples and many parameters, most of the hull
-// is far from all examples, and blends there are poor.
+// In libraries with generated groups (MotionGroup::is_completed), a step of a captured group costs
+// kFarExampleWeight per metre by which its parameters are farther than kNearExampleM from the
+// nearest example. With few examples and many parameters, most of the hull is far from all
+// examples, and blends there are poor.
 constexpr double kNearExampleM = 0.15;
 constexpr double kFarExampleWeight = 0.5;
 // Additional cost per metre outside the hull of the examples, where requests may extrapolate.
@@ -73,7 +74,7 @@ constexpr double kChangeM = 1e-6;
 // Maximum transition distance between movements that may follow each other. Measured distances are
 // at most 0.125 m for captured movements that match, and more than 0.2 m for a stride followed by a
 // movement that starts with the feet together. In some captures, no movement starts close to the
-// stand pose, so the limit also increases with the distance from the stand.
+// stand pose, so the limit is at least kMaxTransitionOfStand times the distance from the stand.
 constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
 
