@@ -65,7 +65,8 @@ def _event_of(e: _abi.stridewire_event) -> Event:
 class Client:
     """A connection to a server.
 
-    The client reconnects automatically until `close` is called. Use it as a context manager:
+    The client reconnects automatically until `close` is called or the server refuses it
+    permanently. Use it as a context manager:
 
         with stridewire.Client("127.0.0.1:7420") as client:
             world = client.join("plaza")

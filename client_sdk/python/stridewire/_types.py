@@ -199,7 +199,8 @@ class Pose:
     discontinuity: bool  #: RAW: True if the previous pose must not be interpolated with this one.
     standing: bool  #: True: the avatar stands and has no request.
     #: Poses with equal segments belong to one continuous motion. Poses with different segments must
-    #: not be blended, because the avatar has teleported or the client has reconnected in between.
+    #: not be blended: for example, the avatar has teleported or the client has reconnected in
+    #: between.
     segment: int
 
 

@@ -103,9 +103,9 @@ namespace Stridewire
         /// <summary>The server sends movements, about 150 bytes per step, and the client evaluates
         /// the poses. They equal those of STRIDEWIRE_FULL bit for bit. The client fetches the
         /// world's library first, unless it is in `library_folder`. Until then, it delays this and
-        /// all later commands to the world. The reply is UNSUPPORTED or MALFORMED if the client
-        /// cannot use the library. An avatar costs the client about 1 us per tick and up to 16 KiB.
-        /// The client ignores avatars beyond `max_pose_bytes` / 16 KiB.</summary>
+        /// all later commands to the world. The reply is UNSUPPORTED, VERSION_MISMATCH or MALFORMED
+        /// if the client cannot use the library. An avatar costs the client about 1 us per tick and
+        /// up to 16 KiB. The client ignores avatars beyond `max_pose_bytes` / 16 KiB.</summary>
         Movement = 2,
     }
 
@@ -136,8 +136,8 @@ namespace Stridewire
     /// <summary>stridewire_event_type of the C API.</summary>
     public enum EventType
     {
-        /// <summary>Uses resumed, and text: the address of the server. The handshake is
-        /// complete.</summary>
+        /// <summary>Uses resumed and text. The handshake is complete. `text` is the address of the
+        /// server.</summary>
         Connected = 0,
         /// <summary>Uses status, text. The client tries again.</summary>
         ConnectFailed = 1,
@@ -161,9 +161,9 @@ namespace Stridewire
         /// <summary>Uses world, dropped_batches, dropped_events. This client reads too
         /// slowly.</summary>
         Lagging = 8,
-        /// <summary>Uses status, text, and command and world if they are known. A message of the
-        /// server that does not end the connection, or the failure of a command with which the
-        /// client restores a lost session.</summary>
+        /// <summary>Uses status, text, and command and world if they are known. Reports an error
+        /// that the server has sent without ending the connection, or the failure of a command with
+        /// which the client restores a lost session.</summary>
         Notice = 9,
         /// <summary>Uses rtt_s, tick, time_s.</summary>
         Pong = 10,

@@ -112,7 +112,8 @@ namespace Stridewire
             }
         }
 
-        /// <summary>Describes the last failed call or connection. Empty: there was none.</summary>
+        /// <summary>Describes the last error, see stridewire_client_last_error of the C API. Empty:
+        /// there was none.</summary>
         public string LastError
         {
             get

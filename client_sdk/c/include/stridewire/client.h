@@ -35,8 +35,8 @@
 ///     The client sends unanswered commands again, and the server executes each of them once.
 ///   - Otherwise the session is lost (STRIDEWIRE_EVENT_SESSION_LOST), for example because the
 ///     server restarted. The client joins its worlds and observes again. With `respawn` it also
-///     spawns its avatars again, each at its last known base frame. Commands that were sent but not
-///     answered end with STRIDEWIRE_SESSION_LOST.
+///     spawns its avatars again, each at its last known base frame. Unanswered commands for avatars
+///     or terrain that were already sent end with STRIDEWIRE_SESSION_LOST.
 ///
 /// Units are metres, seconds and radians. Axes are right-handed with +Y up. Heading 0 faces +Z, and
 /// a positive heading turns to the left. Quaternions are unit quaternions stored as x, y, z, w.
@@ -60,7 +60,7 @@ const char* stridewire_version(void);
 
 // ---------------------------------------------------------------------------------- the client
 
-/// A connection to one server, with its worlds, queues and received poses.
+/// A connection to one server at a time, with its worlds, queues and received poses.
 typedef struct stridewire_client stridewire_client;
 
 /// Number of a joined world, starting at 1. The library assigns it. It stays valid across
@@ -79,10 +79,10 @@ typedef struct stridewire_client_options {
   uint32_t max_commands;
   /// Number of poses stored per avatar, 2 to 4096. Default 32.
   uint32_t pose_history;
-  /// Memory for unanswered commands in bytes, at least 64 KiB. Default 64 MiB.
+  /// Maximum memory for unanswered commands in bytes, at least 64 KiB. Default 64 MiB.
   size_t max_command_bytes;
-  /// Memory for all pose histories in bytes, at least 64 KiB. If the history of an avatar does not
-  /// fit, its poses are dropped and counted in `poses_refused`. Default 256 MiB.
+  /// Maximum memory for all pose histories in bytes, at least 64 KiB. If the history of an avatar
+  /// does not fit, its poses are dropped and counted in `poses_refused`. Default 256 MiB.
   size_t max_pose_bytes;
   /// Delay of the render time behind the server time in seconds, at most 10. If it is negative,
   /// which is the default, the client adapts the delay to the connection.
@@ -106,7 +106,8 @@ typedef struct stridewire_client_options {
   const char* library_folder;
 } stridewire_client_options;
 
-/// Writes the default options. `struct_bytes` is sizeof(stridewire_client_options).
+/// Writes the default options. `struct_bytes` must be sizeof(stridewire_client_options). If the
+/// library was built with another size, the function does nothing.
 void stridewire_client_options_init(stridewire_client_options* options, size_t struct_bytes);
 
 /// Creates a client and starts its network thread. The client does not connect yet. `options` may
@@ -132,11 +133,11 @@ typedef struct stridewire_address {
 } stridewire_address;
 
 /// Same as stridewire_client_connect, but with the addresses of `count` servers that offer the same
-/// worlds, 1 to STRIDEWIRE_MAX_ADDRESSES. The client tries them in order, and waits between
-/// attempts only after all of them have failed. After a lost connection it first tries the same
-/// address again, because only that server can resume the session. After a server has announced its
-/// shutdown, the client starts with the next address. If there are several addresses, the texts of
-/// CONNECT_FAILED and CONNECTION_LOST begin with the address.
+/// worlds, 1 to STRIDEWIRE_MAX_ADDRESSES. The client tries them in order. It waits only after all
+/// of them have failed, and after a lost connection. After a lost connection, it first tries the
+/// same address again, because only that server can resume the session. After a server has
+/// announced its shutdown, the client starts with the next address. If there are several addresses,
+/// the texts of CONNECT_FAILED and CONNECTION_LOST begin with the address.
 stridewire_status stridewire_client_connect_any(stridewire_client* client,
                                                 const stridewire_address* addresses, size_t count);
 
@@ -156,9 +157,12 @@ typedef enum stridewire_client_state {
 /// Returns the state of the connection. A NULL client is idle.
 stridewire_client_state stridewire_client_get_state(stridewire_client* client);
 
-/// Returns the status of the last failed call, connection or attempt to connect, or STRIDEWIRE_OK
-/// if there was none. Writes a description to `text`, truncated to `text_bytes` bytes including the
-/// terminating 0. `text` may be NULL if `text_bytes` is 0.
+/// Returns the status of the last error, or STRIDEWIRE_OK if there was none since the client
+/// started to connect. Errors are lost connections, failed attempts to connect, and failed calls
+/// that connect, ping or submit a command. Calls with an invalid pointer, count, enumerator or
+/// address, and calls that only read data, do not change the result. Writes a description to
+/// `text`, truncated to `text_bytes` bytes including the terminating 0. `text` may be NULL if
+/// `text_bytes` is 0.
 stridewire_status stridewire_client_last_error(stridewire_client* client, char* text,
                                                size_t text_bytes);
 
@@ -169,9 +173,9 @@ stridewire_status stridewire_client_last_error(stridewire_client* client, char* 
 // event STRIDEWIRE_EVENT_REPLY reports the result with the same number. If the checks fail, the
 // call fails and nothing is sent.
 //
-// All commands can fail with INVALID_ARGUMENT, OUT_OF_RANGE, COMMANDS_FULL, CLOSED (the client is
-// idle or closed), NO_SUCH_WORLD (unknown world number) and NOT_JOINED (the server refused the
-// join, or the client has left the world).
+// Commands can fail with INVALID_ARGUMENT, OUT_OF_RANGE, COMMANDS_FULL, CLOSED (the client is idle
+// or closed), NO_SUCH_WORLD (unknown world number) and NOT_JOINED (the server refused the join, or
+// the client has left the world).
 
 /// Joins a world. `world` receives a number that further calls may use at once: the client sends
 /// their commands when the server has accepted the join. Fails with ALREADY_JOINED if this name is
@@ -190,9 +194,9 @@ stridewire_status stridewire_client_spawn(stridewire_client* client, stridewire_
                                           const stridewire_spawn* spawns, size_t count,
                                           uint64_t* command);
 
-/// Moves `count` existing avatars, 1 to STRIDEWIRE_MAX_ITEMS, at once. They drop their movements
-/// and requests, and stand. The next pose of each has the flag `discontinuity`. Fails with
-/// INVALID_ARGUMENT if the id of an avatar is 0.
+/// Moves `count` existing avatars, 1 to STRIDEWIRE_MAX_ITEMS, without animation. They drop their
+/// movements and requests, and stand. The next pose of each has the flag `discontinuity`. Fails
+/// with INVALID_ARGUMENT if the id of an avatar is 0.
 stridewire_status stridewire_client_teleport(stridewire_client* client, stridewire_world world,
                                              const stridewire_spawn* places, size_t count,
                                              uint64_t* command);
@@ -239,25 +243,25 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
                                                  const stridewire_planting* planting,
                                                  uint64_t* command);
 
-/// Observes a world. `subscription`, unless NULL, receives the number of the observation. If
-/// several observations include an avatar, the client stores the first pose it receives for each
-/// tick. Fails with LIMIT_REACHED beyond 256 observations of one world.
+/// Subscribes to poses and events of a world. `subscription`, unless NULL, receives the number of
+/// the subscription. If several subscriptions include an avatar, the client stores the first pose
+/// that it receives for each tick. Fails with LIMIT_REACHED beyond 256 subscriptions to one world.
 stridewire_status stridewire_client_observe(stridewire_client* client, stridewire_world world,
                                             const stridewire_observation* observation,
                                             uint32_t* subscription, uint64_t* command);
 
-/// Moves the region of an observation, for example when the player walks. Avatars inside both
-/// regions neither leave nor enter. Fails with NO_SUCH_SUBSCRIPTION if no observation with a region
-/// has this number.
+/// Replaces the region of a subscription, for example when the player walks. Avatars inside both
+/// regions neither leave nor enter. Fails with NO_SUCH_SUBSCRIPTION if no subscription with a
+/// region has this number.
 stridewire_status stridewire_client_move_region(stridewire_client* client, uint32_t subscription,
                                                 const stridewire_region* region, uint64_t* command);
 
-/// Ends an observation. Fails with NO_SUCH_SUBSCRIPTION if no observation has this number.
+/// Ends a subscription. Fails with NO_SUCH_SUBSCRIPTION if no subscription has this number.
 stridewire_status stridewire_client_stop_observing(stridewire_client* client, uint32_t subscription,
                                                    uint64_t* command);
 
 /// Sends a ping. STRIDEWIRE_EVENT_PONG reports the round-trip time. Fails with NOT_READY without a
-/// connection.
+/// connection, and with COMMANDS_FULL if 64 pings are unanswered.
 stridewire_status stridewire_client_ping(stridewire_client* client);
 
 // -------------------------------------------------------------------------------------- events
@@ -265,7 +269,7 @@ stridewire_status stridewire_client_ping(stridewire_client* client);
 /// Type of an event. The comments list the fields of stridewire_event that the type uses.
 typedef enum stridewire_event_type {
   // Events about the connection.
-  /// Uses resumed, and text: the address of the server. The handshake is complete.
+  /// Uses resumed and text. The handshake is complete. `text` is the address of the server.
   STRIDEWIRE_EVENT_CONNECTED = 0,
   STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< Uses status, text. The client tries again.
   STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< Uses status, text. The client reconnects.
@@ -284,9 +288,9 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_ITEM = 7,
   /// Uses world, dropped_batches, dropped_events. This client reads too slowly.
   STRIDEWIRE_EVENT_LAGGING = 8,
-  /// Uses status, text, and command and world if they are known. A message of the server that does
-  /// not end the connection, or the failure of a command with which the client restores a lost
-  /// session.
+  /// Uses status, text, and command and world if they are known. Reports an error that the server
+  /// has sent without ending the connection, or the failure of a command with which the client
+  /// restores a lost session.
   STRIDEWIRE_EVENT_NOTICE = 9,
   STRIDEWIRE_EVENT_PONG = 10,  ///< Uses rtt_s, tick, time_s.
   /// Uses world. Its terrain has changed; see stridewire_client_get_terrain.
@@ -405,8 +409,8 @@ typedef struct stridewire_event {
 stridewire_status stridewire_client_poll_events(stridewire_client* client, stridewire_event* events,
                                                 size_t capacity, size_t* count);
 
-/// Waits until the event queue is not empty. Returns STRIDEWIRE_TIMEOUT after `timeout_s` (0 to
-/// 3600).
+/// Waits until the event queue is not empty. Returns STRIDEWIRE_TIMEOUT after `timeout_s` seconds
+/// (0 to 3600).
 stridewire_status stridewire_client_wait_event(stridewire_client* client, double timeout_s);
 
 // --------------------------------------------------------------------------------------- poses
@@ -566,8 +570,9 @@ typedef struct stridewire_pose {
   float* rotations_xyzw;
   size_t joint_capacity;  ///< Set by the caller: number of joints that `rotations_xyzw` can hold.
   /// Poses with equal segments belong to one continuous motion. If a pose and the one displayed
-  /// before have different segments, the application must not blend them: the avatar has
-  /// teleported, the client has reconnected, or poses arrived after the extrapolation had ended.
+  /// before have different segments, the application must not blend them. A new segment begins, for
+  /// example, if the avatar has teleported, the client has reconnected, the render time has jumped,
+  /// or poses arrived after the extrapolation had ended.
   uint32_t segment;
 } stridewire_pose;
 
@@ -584,8 +589,9 @@ stridewire_status stridewire_client_latest_pose(stridewire_client* client, strid
                                                 uint32_t avatar, stridewire_pose* pose);
 
 /// Gets the oldest stored pose whose tick is above `after_tick`, or the oldest stored pose if
-/// `after_tick` is UINT64_MAX. An application that calls it more often than every `pose_history`
-/// ticks gets every received pose. Errors are those of stridewire_client_sample_pose.
+/// `after_tick` is UINT64_MAX. The result is STRIDEWIRE_POSE_MISSING if there is none. An
+/// application that calls it more often than every `pose_history` ticks gets every received pose.
+/// Errors are those of stridewire_client_sample_pose.
 stridewire_status stridewire_client_next_pose(stridewire_client* client, stridewire_world world,
                                               uint32_t avatar, uint64_t after_tick,
                                               stridewire_pose* pose);

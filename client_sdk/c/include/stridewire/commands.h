@@ -88,8 +88,8 @@ typedef struct stridewire_movement {
   /// allows, see `speed_m_s` of stridewire_event.
   double speed_m_s;
   stridewire_interrupt interrupt;
-  /// Step: 1 rejects the step unless the foot lands exactly at its place. Not together with
-  /// `allow_nearest`.
+  /// Step: 1 rejects the step unless the foot can land exactly on the requested footprint. Not
+  /// together with `allow_nearest`.
   uint8_t exact_only;
   /// Step, jump: 1 plays the nearest movement of the library, however far it is from the request. 0
   /// rejects the request if its place would be missed by more than 0.2 m, or its direction or
@@ -152,9 +152,9 @@ typedef enum stridewire_pose_mode {
   /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
   /// equal those of STRIDEWIRE_FULL bit for bit. The client fetches the world's library first,
   /// unless it is in `library_folder`. Until then, it delays this and all later commands to the
-  /// world. The reply is UNSUPPORTED or MALFORMED if the client cannot use the library. An avatar
-  /// costs the client about 1 us per tick and up to 16 KiB. The client ignores avatars beyond
-  /// `max_pose_bytes` / 16 KiB.
+  /// world. The reply is UNSUPPORTED, VERSION_MISMATCH or MALFORMED if the client cannot use the
+  /// library. An avatar costs the client about 1 us per tick and up to 16 KiB. The client ignores
+  /// avatars beyond `max_pose_bytes` / 16 KiB.
   STRIDEWIRE_MOVEMENT = 2,
   STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff
 } stridewire_pose_mode;
@@ -183,14 +183,15 @@ typedef struct stridewire_region {
   double radius_m;  ///< Above 0.
   /// An avatar leaves at a distance of `radius_m` + `leave_m`. Negative: the server chooses.
   double leave_m;
-  /// Rings from the inside out. Beyond them, the rate and detail of the observation apply.
+  /// Rings from the inside out. Beyond them, the rate and detail of stridewire_observation apply.
   const stridewire_rate_ring* rings;
   size_t ring_count;  ///< Number of rings, at most STRIDEWIRE_MAX_RATE_RINGS.
-  /// Detail of each ring, or NULL for the detail of the observation. Requires STRIDEWIRE_QUANTISED.
+  /// Detail of each ring, or NULL for stridewire_observation::detail. Requires
+  /// STRIDEWIRE_QUANTISED.
   const stridewire_pose_detail* ring_details;
 } stridewire_region;
 
-/// Determines which poses and events a client receives from a world.
+/// Contents of a subscription: which poses and events a client receives from a world.
 typedef struct stridewire_observation {
   stridewire_pose_mode mode;
   uint16_t every_n_ticks;  ///< Interval of poses in ticks, 1 to 3600.
@@ -203,7 +204,7 @@ typedef struct stridewire_observation {
   stridewire_pose_detail detail;
   /// Observes the avatars inside this region, which requires that `avatars` is NULL. NULL: no
   /// region. The events ENTERED and LEFT report changes. A client that observes a region of a world
-  /// cannot have other observations of that world (NOT_ALLOWED).
+  /// cannot have other subscriptions to that world (NOT_ALLOWED).
   const stridewire_region* region;
 } stridewire_observation;
 

@@ -202,7 +202,7 @@ class Client {
   stridewire_client_state state() const { return stridewire_client_get_state(handle_); }
   bool ready() const { return state() == STRIDEWIRE_STATE_READY; }
 
-  /// Describes why the last call, connection or attempt to connect failed.
+  /// Returns the text of stridewire_client_last_error, at most 1099 bytes. Empty: no error.
   std::string LastError() const {
     char text[1100] = {};
     (void)stridewire_client_last_error(handle_, text, sizeof text);
@@ -301,7 +301,7 @@ class Client {
     std::size_t count = 0;
     return stridewire_client_poll_events(handle_, &event, 1, &count) == STRIDEWIRE_OK && count == 1;
   }
-  /// Waits until the event queue is not empty. Returns false after `timeout_s`.
+  /// Waits until the event queue is not empty. Returns false after `timeout_s` seconds.
   bool WaitEvent(double timeout_s) {
     return stridewire_client_wait_event(handle_, timeout_s) == STRIDEWIRE_OK;
   }
@@ -361,7 +361,7 @@ class Client {
     return avatars;
   }
 
-  /// Returns the server time in seconds. Returns nullopt before the first pose or pong.
+  /// Returns the estimated server time in seconds. Returns nullopt before the first pose or pong.
   std::optional<double> ServerTime() const {
     double time_s = 0.0;
     if (stridewire_client_server_time(handle_, &time_s) != STRIDEWIRE_OK) return std::nullopt;
