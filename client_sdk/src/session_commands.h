@@ -6,9 +6,9 @@ namespace stridewire::client {
 
 /// The commands of a session. Checks, queues, sends and ends them.
 ///
-/// A command is first in `unsent` of its world, until the world has a server id and the output
-/// buffer has room. It then moves to `unanswered_`, which is in order of sequence numbers, and
-/// finally becomes a REPLY event. After a lost session, the session first joins its worlds and
+/// A command is first in `unsent` of its world, until the world has a server id and MaySend returns
+/// true. It then moves to `unanswered_`, which is in order of sequence numbers, and finally becomes
+/// a REPLY event. If the server has lost the session, the client first joins its worlds and
 /// subscribes again, and then sends unsent commands.
 class SessionCommands : public SessionState {
  public:
@@ -66,6 +66,7 @@ class SessionCommands : public SessionState {
   void ChangeWhileClosed(World& world, std::uint32_t subscription, const protocol::Observe* moved);
   /// Encodes all commands that may be sent now.
   void Pump();
+  /// Returns true if the output buffer has room and the server can store another reply.
   [[nodiscard]] bool MaySend() const;
   void Send(Command command);
   /// Determines whether a command may be sent. An Observe of movements waits for its library. If

@@ -69,10 +69,11 @@ class SessionState {
     kClosed,
   };
 
-  /// State of a world. A world that does not exist has none.
+  /// State of a world. kWanted: JoinWorld has not been sent yet, or has to be sent again. kJoining:
+  /// it was sent. kLeft: the application has left the world, and the server has not replied yet.
   enum class WorldState : std::uint8_t { kWanted, kJoining, kJoined, kRefused, kLeft };
 
-  /// While more bytes than this wait for the socket, no further command is encoded.
+  /// While at least this many bytes wait for the socket, no further command is encoded.
   static constexpr std::size_t kMaxOutputBytes = std::size_t{1} << 20;
   static constexpr std::size_t kMaxWorlds = 256;
 
@@ -142,7 +143,7 @@ class SessionState {
     std::optional<protocol::TerrainInfo> terrain;
   };
 
-  /// Stores the error for last_error and returns `status`.
+  /// Stores the error for last_status and last_text, and returns `status`.
   stridewire_status Refuse(stridewire_status status, std::string_view text);
   /// Returns whether the session is connected or tries to connect.
   [[nodiscard]] bool IsOpen() const;
@@ -152,7 +153,7 @@ class SessionState {
   /// Returns the shortest interval of the subscriptions that receive poses of a mode, or 0 if there
   /// are none.
   [[nodiscard]] static std::uint64_t EveryNTicks(const World& world, protocol::PoseMode mode);
-  /// Returns the longest interval of the poses that are observed, in seconds.
+  /// Returns the longest interval of the poses that are observed, in seconds, at most 0.25.
   [[nodiscard]] double PoseIntervalS() const;
   [[nodiscard]] stridewire_event MakeEvent(stridewire_event_type type, stridewire_world world = 0,
                                            stridewire_status status = STRIDEWIRE_OK,
@@ -198,7 +199,7 @@ class SessionState {
   std::size_t address_ = 0;          ///< Index of the current address.
   std::size_t failed_attempts_ = 0;  ///< Attempts that have failed since the last delay.
   double next_attempt_s_ = 0.0;
-  double deadline_s_ = 0.0;  ///< Timeout of kConnecting, kGreeting and kClosing.
+  double deadline_s_ = 0.0;  ///< Time at which kConnecting, kGreeting or kClosing times out.
   double ready_s_ = 0.0;
   double heard_s_ = 0.0;
   double next_ping_s_ = 0.0;

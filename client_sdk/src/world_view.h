@@ -149,8 +149,8 @@ class WorldView : public PoseSink {
   [[nodiscard]] double newest_time_s() const { return newest_time_s_; }
 
  private:
-  /// The last ticks of a shard in which poses were evaluated, as a ring. Each tick has a number:
-  /// they are counted from 0 on.
+  /// A ring buffer of the last ticks of a shard in which poses were evaluated. These ticks are
+  /// numbered from 0 in order of arrival.
   struct ShardTicks {
     struct Tick {
       std::uint64_t tick = 0;
@@ -165,9 +165,9 @@ class WorldView : public PoseSink {
       return count - std::min<std::uint64_t>(count, ring.size());
     }
 
-    // Scratch memory of SampleAll: the sampled time is `share` of the way from tick number
-    // `sampled` to the next one. `is_sampled` is false if the time is before the oldest or after
-    // the newest tick.
+    // Scratch memory of SampleAll: the sampled time is between tick number `sampled` and the next
+    // one, and `share` is the fraction of this interval that has passed. `is_sampled` is false if
+    // the time is before the oldest or after the newest tick.
     std::uint64_t sampled = 0;
     double share = 0.0;
     bool is_sampled = false;
@@ -247,7 +247,8 @@ class WorldView : public PoseSink {
   void Record(Track& track, const PoseStamp& stamp, const AvatarReplica& replica);
   /// Adds the tick of the current message to those of its shard.
   void AddTick();
-  /// Returns true if the movement that continues includes a pose.
+  /// Returns true if a pose belongs to the movement that the track continues, so that it need not
+  /// be stored.
   [[nodiscard]] bool IsContinued(const Track& track, const PoseStamp& stamp,
                                  const AvatarReplica& replica) const;
   /// Begins to continue the movement of the newest pose, unless the display has extrapolated beyond
@@ -278,8 +279,8 @@ class WorldView : public PoseSink {
   void RecordEvaluated(const protocol::Movements& movements);
   void EncodeBlock(const protocol::CompactCodec& codec);
 
-  /// Must be called after the last part of a batch. Marks the avatars of its shard and mode that it
-  /// did not contain as gone.
+  /// Must be called after the last part of a batch. Unless the batch is partial, marks the avatars
+  /// of its shard and mode as gone that none of its parts contained.
   void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
   /// Erases avatars that have been gone for longer than kKeepGoneS.
   void EraseGone(double time_s);
