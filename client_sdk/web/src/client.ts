@@ -14,7 +14,7 @@ import type {Role, World} from './types';
 const maxTimerMs = 500;
 /** Maximum number of addresses, as in the C API. */
 const maxAddresses = 16;
-/** If the socket has more unsent bytes than this, the session does not send further commands. */
+/** While the socket has at least this many unsent bytes, it receives no further output. */
 const maxBufferedBytes = 1 << 20;
 
 /**
@@ -23,15 +23,16 @@ const maxBufferedBytes = 1 << 20;
  * After `connect`, the client reconnects automatically until `close` is called or the server
  * refuses it. The first attempt after a failure follows within 0.1 s. The delay doubles up to 5 s,
  * and each delay is shortened at random by up to half. If there are several addresses, the client
- * tries them in order.
+ * tries them in order, and waits only after all of them have failed or after a lost connection.
  *
  * While there is no connection, new commands wait. After a reconnect, the server usually still has
  * the session. The client then sends commands without a reply again, and the server executes each
- * command once. If the session is lost, because the server was restarted or the interruption was
- * too long, these commands fail with `session_lost`. The client then joins its worlds and starts
- * its subscriptions again.
+ * command once. The session is lost if the server was restarted or the interruption was too long.
+ * Unanswered commands for avatars or terrain that were already sent then fail with `session_lost`,
+ * and the client joins its worlds and starts its subscriptions again.
  *
- * Only the constructor throws. Promises of commands are never rejected.
+ * Only the constructor throws, and promises of commands never reject, unless the WebAssembly module
+ * has stopped because of an internal error.
  */
 export class Client {
   private readonly session: Session;
@@ -47,7 +48,8 @@ export class Client {
 
   /**
    * Creates a client that is not connected yet.
-   * @throws Error WebAssembly or its SIMD instructions are missing
+   * @throws Error WebAssembly or its SIMD instructions are missing, or the browser cannot compile
+   *     the module
    * @throws RangeError an option is out of range
    * @throws SyntaxError a URL does not start with ws:// or wss://
    * @throws TypeError an option has the wrong type, there is no WebSocket class, or the machine is
@@ -89,7 +91,7 @@ export class Client {
     return this.session.state;
   }
 
-  /** Reason why the connection last failed or was lost; empty if that never happened. */
+  /** Reason why a connection last failed or was lost; empty if none has since `connect`. */
   get lastError(): string {
     return this.session.lastError;
   }
@@ -142,7 +144,8 @@ export class Client {
 
   /**
    * Joins a world as soon as the client is connected, and returns it at once. If the name is
-   * invalid or already joined, or if 256 worlds are joined, the state of the result is `refused`.
+   * invalid or already joined, if 256 worlds are joined, or if `maxCommands` commands are
+   * unanswered, the state of the result is `refused`.
    */
   joinWorld(name: string, role: Role = 'controller'): World {
     return this.session.joinWorld(name, role);

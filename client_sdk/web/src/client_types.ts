@@ -113,8 +113,9 @@ export interface ClientListeners {
    */
   connected: (resumed: boolean) => void;
   /**
-   * Called when the server no longer has the previous session. Sent commands fail with
-   * `session_lost`; the client joins its worlds and starts its subscriptions again.
+   * Called when the server no longer has the previous session. Unanswered commands for avatars or
+   * terrain that were already sent fail with `session_lost`. The client joins its worlds and starts
+   * its subscriptions again.
    */
   sessionLost: () => void;
   /**

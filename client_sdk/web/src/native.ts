@@ -121,7 +121,7 @@ if (typeof WebAssembly === 'undefined') {
 
 /**
  * Returns the module.
- * @throws Error WebAssembly or its SIMD instructions are missing
+ * @throws Error WebAssembly or its SIMD instructions are missing, or the module cannot be compiled
  */
 export function native(): Native {
   if (loaded === null) throw new Error(failure);

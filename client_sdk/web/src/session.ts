@@ -28,12 +28,14 @@ const userMessages: readonly number[] = [MessageType.WorldInfo, MessageType.Even
 type Answer = (reply: Reply, message?: Message) => void;
 
 /**
- * The web client's view of a session of the C++ client, which runs in the WebAssembly module
- * (client_sdk/src/session.h describes its states). The module keeps worlds, commands, the clock and
- * poses. This class turns its events into promises and calls of listeners.
+ * A session of the web client. It wraps a session of the C++ client, which runs in the WebAssembly
+ * module (client_sdk/src/session.h describes its states). The module stores worlds, commands and
+ * poses, and maps local time to server time. This class resolves promises and calls listeners when
+ * the module reports events.
  *
- * It has no socket, clock or timer: frames and times are arguments. Listeners and promises are
- * called only after the session has finished processing.
+ * This class has no socket, and no timer except those that limit the time for loading a cached
+ * library. Frames and the current time are arguments. It resolves promises and calls listeners only
+ * after the module has finished processing.
  */
 export class Session {
   readonly listeners = new Listeners<ClientListeners>();
@@ -170,7 +172,7 @@ export class Session {
     };
   }
 
-  /** Updates `interpolationDelayS` after poses of a world were sampled for `timeS`. */
+  /** Updates `interpolationDelayS` when poses of a world are sampled for `timeS`. */
   recordSample(world: WorldHandle, timeS: number): void {
     const newestS = world.stateNumbers()?.[1] ?? -Infinity;
     if (newestS === -Infinity) return;
@@ -180,10 +182,10 @@ export class Session {
   // ---- Methods that the network calls. Times must not decrease.
 
   /**
-   * Returns what the network needs to know; bools are 0 or 1. `nextTimeS`: time at which to call
-   * `advanceTime` or this function; Infinity: never. `connectDue`: call `startConnecting`, and
-   * connect to the address with the index `addressIndex`. `needsSocket`: if not, close the socket.
-   * `connectionNumber` increases with every connection.
+   * Returns the state of the session for the network. Flags are 0 or 1. `nextTimeS`: time at which
+   * to call `advanceTime` or this function; Infinity: never. `connectDue`: call `startConnecting`,
+   * and connect to the address with the index `addressIndex`. `needsSocket`: if not, close the
+   * socket. `connectionNumber` increases with every connection.
    */
   network(nowS = 0): {
     nextTimeS: number, connectDue: number, needsSocket: number, connectionNumber: number,
@@ -324,7 +326,7 @@ export class Session {
   }
 
   private takeEvents(frame?: ArrayBuffer): void {
-    // Each frame is read at most once, and only if it contains something that concerns the user.
+    // Each frame is read at most once, and only if it contains something for the application.
     let message: Message | null = null;
     const read = (): Message => message ??= readMessage(frame!);
     const type = frame === undefined ? 0 : typeOfFrame(frame);

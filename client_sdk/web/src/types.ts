@@ -57,7 +57,10 @@ type Optional<T, K extends keyof T> = Omit<T, K> & {[name in K]?: T[name]};
  */
 export type Parameters = {readonly [name in ParameterName]?: number};
 
-/** Result of a command. Commands never throw, and their promises are never rejected. */
+/**
+ * Result of a command. Commands never throw. Their promises reject only if the WebAssembly module
+ * has stopped because of an internal error.
+ */
 export interface Reply {
   /** True if the command and all of its items were carried out. */
   readonly ok: boolean;
@@ -100,9 +103,10 @@ export type LayerRequest =
  * A movement to add to an avatar's queue. The comments state which types use a field; other types
  * ignore it. Absent numbers are 0 unless stated otherwise.
  *
- * A step or jump is rejected when it is about to start if the motion library would miss its place
- * by more than 0.2 m, or its direction or heading by more than 60 degrees. The event `rejected`
- * contains the nearest one in reach. Smaller errors are visible in `WorldEvent.applied`.
+ * Unless `allowNearest` is true, a step or jump is rejected when it is about to start if the motion
+ * library would miss its place by more than 0.2 m, or its direction or heading by more than 60
+ * degrees. The event `rejected` contains the nearest one in reach. Smaller errors are visible in
+ * `WorldEvent.applied`.
  */
 export interface MovementRequest
     extends Given<Omit<RequestItem, 'avatar' | 'requestId' | 'type'>> {
@@ -228,7 +232,7 @@ export interface Pose {
   /** World position of the root. */
   readonly rootM: Float32Array;
   jointCount: number;
-  /** Tick of the received pose at or before the sampled time. */
+  /** Tick of the last received pose at or before the sampled time. */
   tick: number;
   /** True if the avatar stands and its queue is empty. */
   standing: boolean;
@@ -236,9 +240,12 @@ export interface Pose {
   detail: PoseDetail;
   /** If the pose is extrapolated or held: time since the last received pose. Otherwise 0. */
   heldS: number;
-  /** Poses with equal segments belong to one continuous motion. If a pose and the one displayed
-   * before have different segments, do not blend them: the avatar has teleported, the client has
-   * reconnected, or poses arrived after the extrapolation had ended. */
+  /**
+   * Poses with equal segments belong to one continuous motion. If a pose and the one displayed
+   * before have different segments, do not blend them. A new segment begins, for example, if the
+   * avatar has teleported, the client has reconnected, the render time has jumped, or poses arrived
+   * after the extrapolation had ended.
+   */
   segment: number;
 }
 
@@ -334,8 +341,8 @@ export interface World {
   observe(observation: Observation): Subscription;
   /**
    * Returns the state of an avatar, about one tick later. Rejects with a `StridewireError` if the
-   * avatar does not exist, the client is not connected, the reply takes longer than 10 s, or 64
-   * calls are already pending.
+   * avatar does not exist, the world is not joined, the client is not connected or loses the
+   * connection, the reply takes longer than 10 s, or 64 calls are already pending.
    */
   inspect(avatar: number): Promise<AvatarState>;
   /** Leaves the world. The object cannot be used afterwards; join the world again instead. */
