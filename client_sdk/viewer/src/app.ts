@@ -41,10 +41,7 @@ import type {WalkHost} from './walk_tool.js';
 import type {AvatarSelection, WorldPane} from './world_pane.js';
 import {WorldPanes} from './world_panes.js';
 
-/**
- * Interval at which the panels request the states of avatars, and at which the page measures the
- * layout of its elements.
- */
+/** Interval at which the page updates its panels and measures the layout of its elements. */
 const panelUpdateIntervalMs = 250;
 /** Interval at which the list of worlds is requested from the server. */
 const serverInfoIntervalMs = 4000;
@@ -639,7 +636,7 @@ export class App {
     }
     if (this.walkTool.active && this.commands.targets().length === 1 &&
         this.commandedPane() === pane) {
-      // A press without Shift was handled by `WalkTool.grab` and never becomes a click.
+      // WalkTool.grab has already handled presses on the ground without Shift.
       const atM = shift ? pane.view.terrainPointAt(x, y) : null;
       if (atM) this.walkTool.addWaypoint(pane, atM);
       return;

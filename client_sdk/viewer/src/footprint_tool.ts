@@ -88,7 +88,10 @@ export class FootprintTool {
     });
   }
 
-  /** If the server rejects a step, outlines the nearest reachable footprint for a while. */
+  /**
+   * If the event rejects a step that this page has requested, outlines the nearest reachable
+   * footprint for a while.
+   */
   onEvent(pane: WorldPane, event: WorldEvent): void {
     if (event.type === 'finished') this.requests.delete(event.requestId);
     if (event.type !== 'rejected' || !this.requests.delete(event.requestId)) return;

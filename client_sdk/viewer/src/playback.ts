@@ -52,7 +52,7 @@ export class Playback {
     this.paused = true;
     this.live_ = false;
   }
-  /** Continues at the current time, without becoming live. */
+  /** Continues from the current time. At full speed, playback becomes live at the live time. */
   resume(): void {
     this.paused = false;
   }

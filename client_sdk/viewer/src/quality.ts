@@ -64,7 +64,7 @@ const longestRetryMs = 240_000;
 const smallCrowd = 24;
 const coarsestForSmallCrowd = 3;
 
-/** The level that a software renderer starts with, which is also the finest that it uses. */
+/** Returns the level with which a software renderer starts, the finest that is chosen for it. */
 export function initialSoftwareLevel(avatars: number): number {
   return avatars <= 3 ? 1 : avatars <= smallCrowd ? 2 : avatars <= 120 ? 4 : 5;
 }
@@ -99,7 +99,7 @@ export class Quality {
   get settings(): QualityLevel {
     return (this.software ? softwareLevels : hardwareLevels)[this.level]!;
   }
-  /** True if slow frames have reduced the quality. */
+  /** True if the level was chosen automatically and is not the finest. */
   get lowered(): boolean {
     return this.choice === 'auto' && this.level_ > 0;
   }

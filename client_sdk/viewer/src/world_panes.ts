@@ -91,7 +91,10 @@ export class WorldPanes {
     }
   }
 
-  /** True while a world waits for its motion library. It shows quantised poses until then. */
+  /**
+   * True while a world in movement mode waits for its motion library and for the server's reply.
+   * Until then, it shows the poses of its previous subscription, or quantised poses.
+   */
   get fetchesLibrary(): boolean {
     return this.stream.mode === 'movement' && this.panes.some((pane) => !pane.subscribed);
   }
