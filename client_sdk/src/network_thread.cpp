@@ -60,8 +60,8 @@ struct NetworkThread::Impl {
     });
   }
 
-  /// Opens, closes and writes to the socket as the session requires. Every handler ends with this
-  /// call.
+  /// Handles timeouts of the session, opens, closes and writes to the socket as it requires, and
+  /// runs its next library task. Called every kStepInterval, after Wake, and by most handlers.
   void Step() {
     ConnectionPtr to_start;
     ConnectionPtr to_write;

@@ -29,9 +29,9 @@ class PoseRecording {
   /// Time after the last batch of its stream for which an avatar can be sampled, in seconds.
   static constexpr double kKeepS = 2.0;
 
-  /// Creates a recording of `length_s` seconds. Batches and decoded ticks take at most `max_bytes`,
-  /// and decoded ticks take at most half of that. A call of SampleAll may take more until it
-  /// returns. If either argument is 0, nothing is recorded.
+  /// Creates a recording of `length_s` seconds. Batches, movements and decoded ticks take at most
+  /// `max_bytes`, and decoded ticks take at most half of that. A call of SampleAll may take more
+  /// until it returns. If either argument is 0, nothing is recorded.
   PoseRecording(double length_s, std::size_t max_bytes)
       : length_s_(length_s), max_bytes_(max_bytes) {}
 
@@ -52,12 +52,12 @@ class PoseRecording {
   /// Returns the server time of the oldest recorded pose; NaN if the recording is empty.
   [[nodiscard]] double first_time_s() const;
   [[nodiscard]] double last_time_s() const { return last_time_s_; }
-  /// Returns the memory of batches and decoded ticks.
+  /// Returns the memory of batches, movements and decoded ticks.
   [[nodiscard]] std::size_t bytes() const { return bytes_ + movements_.bytes() + DecodedBytes(); }
 
-  /// Computes the poses at `time_s` of all avatars for which `wants` returns true. Outside the
-  /// recorded time, `out` is empty. Like PoseHistory, it does not interpolate across
-  /// discontinuities.
+  /// Computes the poses at `time_s` of all avatars for which `wants` returns true. Before the
+  /// recorded time, and more than kKeepS after it, `out` is empty. Like PoseHistory, it does not
+  /// interpolate across discontinuities.
   void SampleAll(double time_s, const std::function<bool(protocol::AvatarId)>& wants,
                  CrowdPose& out);
 

@@ -113,7 +113,7 @@ class StridewireError(Exception):
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happened. Fields that its type does not use are 0 or empty."""
+    """Something that happened. Ignore fields that its type does not use."""
 
     type: EventType
     status: str  #: Name of a status, "ok" if nothing failed.

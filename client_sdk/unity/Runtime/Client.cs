@@ -49,9 +49,9 @@ namespace Stridewire
     }
 
     /// <summary>A connection to a server. The client connects, and reconnects, in the background.
-    /// No method waits for the server, apart from WaitEvent: commands are queued, and events report
-    /// their results. Methods that fail throw StridewireException. Use a client, its worlds and
-    /// their events on one thread.</summary>
+    /// Only WaitEvent and Dispose wait for the server. Commands are queued, and events report their
+    /// results. Methods that fail throw StridewireException. Use a client, its worlds and their
+    /// events on one thread.</summary>
     public sealed unsafe class Client : IDisposable
     {
         private const int MaxPolledEvents = 64;

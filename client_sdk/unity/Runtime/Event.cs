@@ -1,7 +1,7 @@
 namespace Stridewire
 {
-    /// <summary>Something that happened. EventType lists the properties that each type uses; all
-    /// others are 0. Reading Text allocates a string, all other properties allocate nothing.
+    /// <summary>Something that happened. EventType lists the properties that each type uses.
+    /// Ignore the others. Reading Text allocates a string, all other properties allocate nothing.
     /// </summary>
     public unsafe struct Event
     {

@@ -97,8 +97,8 @@ namespace Stridewire
 
         // Poses.
 
-        /// <summary>Subscribes to the poses of some avatars, or of all if avatars is null. Returns
-        /// the number of the subscription.</summary>
+        /// <summary>Subscribes to the poses of some avatars, or of all if avatars is null or empty.
+        /// Returns the number of the subscription.</summary>
         public uint Observe(PoseMode mode = PoseMode.Quantised, uint[] avatars = null,
                             int everyNTicks = 1, bool withEvents = false)
         {

@@ -351,7 +351,8 @@ typedef enum stridewire_outcome {
   STRIDEWIRE_OUTCOME_MAX = 0x7fffffff
 } stridewire_outcome;
 
-/// An event. Fields that its type does not use are 0.
+/// An event. Fields that its type does not use are 0, except `group`, which is -1, and `kind`,
+/// which is STRIDEWIRE_KIND_STAND in events about an avatar.
 typedef struct stridewire_event {
   stridewire_event_type type;
   stridewire_status status;
