@@ -195,7 +195,10 @@ export interface Subscription {
   stop(): Promise<Reply>;
 }
 
-/** Something that happened to an avatar. Fields that the type does not use are 0, empty or null. */
+/**
+ * Something that happened to an avatar. Fields that the type does not use are 0, empty or null,
+ * except `group`, which is -1, and `kind`, which is `stand`.
+ */
 export interface WorldEvent extends Omit<messages.Event, 'foot'> {
   /** Foot strike: the foot that landed. Rejected step: the foot that should have moved. */
   readonly foot: Foot | null;
@@ -293,7 +296,10 @@ export interface Recording {
   readonly lastTimeS: number;
   /** Memory in use. The size of the events is an estimate. */
   readonly bytes: number;
-  /** Same as `World.sampleAll`, but from the recording. Returns 0 outside the recorded time. */
+  /**
+   * Same as `World.sampleAll`, but from the recording. Returns 0 before the recorded time and more
+   * than 2 s after it.
+   */
   sampleAll(timeS: number, out: CrowdPose): number;
   /** Returns recorded events with server times in [fromS, toS], in order of arrival. */
   events(fromS: number, toS: number): WorldEvent[];

@@ -156,7 +156,8 @@ export function findBodyParts(skeleton: SkeletonLike): BodyParts {
   for (const leg of legs) extendHeight(leg.toe);
   const heightM = Math.max(high - low, 0.2);
 
-  // The head is the joint named "head", or else the joint that moves the highest point.
+  // The head is the first joint whose name ends in "head", or else the joint with the highest
+  // point.
   let head = -1;
   let crownY = -Infinity;
   for (let j = 0; j < count; ++j) {

@@ -117,9 +117,10 @@ export interface PointerActions {
   zoom(factor: number): void;
   click(x: number, y: number, double: boolean, shift: boolean): void;
   /**
-   * Called on a press. If it returns true, the gesture drags an object instead of the camera:
-   * `drag` follows for each movement, then either `drop` (with the duration of the press), or
-   * `cancelDrag` if a second finger touches or the browser cancels the press.
+   * Called on a touch, or on a press of the main button without Shift. If it returns true, the
+   * gesture drags an object instead of the camera: `drag` follows for each movement, then either
+   * `drop` (with the duration of the press), or `cancelDrag` if a second finger touches or the
+   * browser cancels the press.
    */
   grab?(x: number, y: number, touch: boolean): boolean;
   drag?(x: number, y: number): void;

@@ -243,7 +243,10 @@ export class CrowdMesh {
     this.colouredAvatars.length = 0;
   }
 
-  /** Draws these poses from now on. Allocates only if the crowd has grown. */
+  /**
+   * Draws these poses from now on. Allocates only if the crowd has grown, or if its size requires
+   * another level of detail.
+   */
   update(pose: CrowdPose, terrain: TerrainSurface | null = null): void {
     const size = pose.count * this.jointCount * floatsPerMatrix;
     if (size > this.matrices.length) this.reserve(pose.count);

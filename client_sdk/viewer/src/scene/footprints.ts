@@ -68,7 +68,7 @@ export class Footprints {
     this.decals.upload(Math.min(this.next, this.limit));
   }
 
-  /** Number of footprints added since the page was opened. */
+  /** Number of footprints added so far, including those that are no longer drawn. */
   get addedCount(): number {
     return this.total;
   }

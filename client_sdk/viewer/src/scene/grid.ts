@@ -93,7 +93,7 @@ export class Grid {
     this.object = software ? this.makeSimple() : this.makeDetailed();
   }
 
-  /** Centres the plane at x, z. `distanceM` is the camera's distance. */
+  /** Centres the plane on the strong lines near x, z. `distanceM` is the camera's distance. */
   follow(x: number, z: number, distanceM: number): void {
     // From far away, lines every metre would merge into a grey area.
     if (this.fineLines) this.fineLines.visible = distanceM < 24;

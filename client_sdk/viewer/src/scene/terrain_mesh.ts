@@ -185,8 +185,8 @@ function addField(surface: MeshData, field: HeightField, cells: number): void {
 }
 
 /**
- * Adds lines along the height field, about one per metre. Used with software renderers, where the
- * fragment shader draws no grid.
+ * Adds lines along the height field, about one per metre, but fewer if the field is large. Used
+ * with software renderers, where the fragment shader draws no grid.
  */
 function addGridLines(lines: number[], field: HeightField): void {
   const {originM, cellM, columns, rows, heightsM} = field;

@@ -302,8 +302,8 @@ export class WorldView {
   }
 
   /**
-   * Returns the avatar with the joint nearest to a point of the page within `reachPx`; 0 if there
-   * is none.
+   * Returns an avatar that has a joint within `reachPx` of a point of the page; 0 if there is none.
+   * Of several, it selects the one that is closest to the point and to the camera.
    */
   pick(x: number, y: number, reachPx: number): number {
     const crowd = this.crowd;
@@ -322,7 +322,7 @@ export class WorldView {
           depth = projected.z;
         }
       }
-      // If two avatars overlap, selects the one closer to the camera.
+      // One metre of depth counts as much as 4 pixels.
       const cost = near + depth * 4;
       if (near <= reachPx && cost < bestCost) {
         bestCost = cost;
