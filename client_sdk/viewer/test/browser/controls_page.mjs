@@ -336,7 +336,7 @@ export function sharedChecks(t) {
       await toggle();
       assert.equal(await t.isPressed(walk) || await t.isPressed(step), false);
     },
-    /** The layer starts and ends with its button, which the right arm shows. */
+    /** The button starts and ends the layer, which changes the pose of the right arm. */
     async togglesLayer(layer) {
       await t.makeIdle();
       const subscription = alpha.observe({mode: 'full', avatars: [state.avatar]});
@@ -375,7 +375,7 @@ export function sharedChecks(t) {
       await t.press(`Close ${name}`);
       assert.equal(await page.locator(`#panel-${name.toLowerCase()}`).isVisible(), false);
     },
-    /** The checkbox shows something in the scene. */
+    /** The checkbox changes what the scene shows. */
     async changesScene(id) {
       await t.openPanel('View');
       await t.holdQuality();

@@ -90,7 +90,7 @@ test('a page that was hidden or frozen displays what is now', async () => {
       return `${buffered.toFixed(1)} MB buffered, ${(Math.max(...residents) / 1e3).toFixed(0)} ` +
         'MB resident';
     };
-    /** Waits until the page displays what is now, and returns how long that took in each mode. */
+    /** Waits until the page displays current poses. Returns how long that took in each mode. */
     const recovery = async () => {
       await waitFor('the page is visible', () => page.evaluate(
         () => document.visibilityState === 'visible'));
