@@ -40,8 +40,8 @@ void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
 ///
 /// A pose is either stored, or it is determined by a movement and evaluated when it is first read.
 /// Between two poses that are determined by the same movement, or by successive ones, the displayed
-/// pose is that of the movement instead of an interpolated one. Only movements are allocated after
-/// the constructor. The history keeps a movement while it has poses of it.
+/// pose is that of the movement instead of an interpolated one. After construction, only the list
+/// of movements allocates memory. The history keeps a movement while it has poses of it.
 ///
 /// The displayed motion is continuous, no matter when poses arrive:
 /// - A curve through the poses is not changed after its display has begun. The slope at a pose is

@@ -339,7 +339,7 @@ std::optional<double> WorldView::SampledTime(Continued& continued) const {
 void WorldView::PrepareHistory(Track& track, double time_s) {
   const Continued& continued = track.continued;
   if (continued.movement == nullptr) return;
-  // After the newest tick, the motion is extrapolated until the next pose, which may be late.
+  // Usually the next tick is late. The history then extrapolates the motion from all its poses.
   if (!continued.ticks->is_sampled) return EndContinuing(track);
   if (continued.ticks->sampled < continued.stored.tick && track.history.IsMovementAt(time_s))
     return;

@@ -128,14 +128,14 @@ export function native(): Native {
   return loaded;
 }
 
-/** Converts names of fields in a text of the module to those of the web client. */
+/** Converts the snake_case names of fields in an error text of the module to camelCase. */
 export function webNames(text: string): string {
   return text.replace(/_([a-z])/g, (_, letter: string) => letter.toUpperCase());
 }
 
 /**
- * Views of the module's memory. A view is created again only if the memory or the address has
- * changed.
+ * A view of the module's memory. It is created again only if the memory, the address or the length
+ * has changed.
  */
 export class MemoryView<T extends Float32Array | Uint32Array | Uint8Array> {
   private view: T;

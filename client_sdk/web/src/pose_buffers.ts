@@ -47,7 +47,10 @@ function reserve(out: CrowdPose, count: number, jointCount: number): void {
   }
 }
 
-/** Copies crowds from the WebAssembly module, whose memory moves when it grows. @internal */
+/**
+ * Copies the poses of crowds out of the WebAssembly module, because views of the module's memory
+ * become invalid when it grows. @internal
+ */
 export class CrowdReader {
   private readonly ids = new MemoryView(Uint32Array);
   private readonly flags = new MemoryView(Uint8Array);

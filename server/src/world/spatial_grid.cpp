@@ -26,8 +26,8 @@ void SpatialGrid::Sort() {
 }
 
 std::int64_t SpatialGrid::CellOf(double metres) const {
-  // The centre of a region can be anywhere. The limit keeps the conversion in range; avatars are
-  // within some hundred kilometres of the origin.
+  // The centre of a region can be anywhere. The limit prevents overflow in the conversion. It does
+  // not affect avatars, whose coordinates are at most protocol::kMaxRootM.
   constexpr double kMaxCell = 1e9;
   return static_cast<std::int64_t>(
       std::floor(std::clamp(metres * cells_per_m_, -kMaxCell, kMaxCell)));

@@ -100,7 +100,7 @@ class WorldShard {
     std::uint64_t placed_tick = 0;  // Tick of the spawn or of the last teleport.
     EncodedPoseCache::Slot poses;
   };
-  // Prefetches the members that CachePoses reads of an avatar without events.
+  // Prefetches the members that CachePoses reads if no event of the avatar is due.
   static void Prefetch(const Entry& entry) {
     entry.avatar.PrefetchTickState();
     PrefetchBytes(&entry.placed_tick, sizeof(entry.placed_tick) + sizeof(entry.poses));

@@ -396,8 +396,8 @@ typedef struct stridewire_event {
   double nearest_height_m;
   double nearest_turn_rad;
   double nearest_heading_rad;  ///< Heading of the foot at `position_m`, or of the avatar (jump).
-  /// ACCEPTED: the walking speed of the library that is closest to the requested one. End of a
-  /// walk: its mean speed without the first and the last steps. 0: unknown.
+  /// ACCEPTED: the possible walking speed that is closest to the requested one. End of a walk: its
+  /// mean speed without the first and the last steps. 0: unknown.
   double speed_m_s;
   /// How the request ended. The last event of every accepted request contains its outcome; all
   /// other events contain NONE. The application may miss the last event if the session is lost, or

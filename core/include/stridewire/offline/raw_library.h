@@ -30,7 +30,7 @@ struct RawGroup {
   std::vector<ParameterName> parameters;
   std::vector<RawExample> examples;
   /// True if all examples were generated because the captures lack such movements. LibraryBuilder
-  /// stores all of them. Requests use them only if captured groups do not fit.
+  /// stores all of them. Requests prefer captured groups that fit nearly as well.
   bool is_completed = false;
 };
 
@@ -50,9 +50,9 @@ struct RawLibrary {
   Skeleton skeleton;
   /// Standing pose. The root is at x = z = 0 with heading 0, and y is its height above the ground.
   Pose stand_pose;
-  /// Deviation of the feet in `stand_pose` from flat feet. It is a sum over both ankles and both
-  /// toe tips: each adds the difference between its height above the ball and that of a flat foot,
-  /// minus 1.5 cm, or 0 if the difference is smaller. If the sum is too large, CompleteLibrary
+  /// Deviation of the feet in `stand_pose` from flat feet. For both ankles and both toe tips, the
+  /// height above the ball is compared with that of a flat foot. The deviation is the sum of the
+  /// parts of these absolute differences that exceed 1.5 cm. If it is too large, CompleteLibrary
   /// replaces the stand pose.
   double stand_tilt_m = 0.0;
   std::vector<RawGroup> groups;

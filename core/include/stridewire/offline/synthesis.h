@@ -34,7 +34,7 @@ struct MovementRecord {
   double end_s = 0.0;
   std::vector<double> keytimes_s;
   ParameterValues requested;
-  ParameterValues applied;  ///< `requested` after clamping to the range of the examples.
+  ParameterValues applied;  ///< `requested`, clamped to the hull of the examples plus 10 %.
   /// Weighted sum of the examples' parameters, with the weights of the blend. The weight correction
   /// chooses these weights so that `measured` equals `applied`. Without weight correction, equals
   /// `applied`.

@@ -144,8 +144,8 @@ inline constexpr std::size_t kMaxWaypoints = 64;
 
 /// Checks a request. Errors: kOutOfRange if a number is not finite or out of range, or if there are
 /// too many waypoints; kInvalidArgument if both `exact_only` and `allow_nearest` are set;
-/// kUnsupported if the library has no such movement: no step of the requested foot, no jump or, for
-/// a walk, no steps of one foot. Error::where is "step", "jump", "walk_to" or "stand".
+/// kUnsupported if the library lacks steps of the requested foot, jumps or, for a walk, steps of
+/// both feet. Error::where is "step", "jump", "walk_to" or "stand".
 [[nodiscard]] Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request);
 
 /// Values of the parameters of a group, in the order of MotionGroup::parameters.

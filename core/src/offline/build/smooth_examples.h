@@ -38,7 +38,7 @@ inline constexpr int kExamplesPerCoefficient = 4;
 // but the weights of the others are 0.
 struct SmoothGroup {
   std::vector<double> sites, dilations, linear, radial;
-  // Its spans refer to the other members, and its sites are the examples used.
+  // A copy of the group, whose sites are the examples used. Some of its spans refer to the vectors.
   MotionGroup group;
 };
 
