@@ -20,6 +20,7 @@
 #include "random.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/library_file.h"
+#include "runtime/plan/transition_path.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/synthesis.h"
@@ -223,6 +224,19 @@ TEST(TransitionPath, ReportsThatFeetCannotComeTogether) {
             "movements[1]: this library has no transition path from step_left to jump");
 }
 
+// A standing avatar whose feet are apart may have no path either (found by LibraryMutation).
+TEST(TransitionPath, HasAReasonForEveryKindOfMovement) {
+  using enum MovementKind;
+  for (const MovementKind to : {kStepLeft, kStepRight, kJump}) {
+    const std::string end = " to " + std::string(MovementKindName(to));
+    for (const MovementKind from : {kStepLeft, kStepRight, kJump}) {
+      EXPECT_EQ(NoPathReason(from, to), "this library has no transition path from " +
+                                            std::string(MovementKindName(from)) + end);
+    }
+    EXPECT_EQ(NoPathReason(kStand, to), "this library has no transition path from a stand" + end);
+  }
+}
+
 TEST(TransitionPath, ReportsThatTheLibraryHasOneFootOnly) {
   RawLibrary raw = MakeTestRawLibrary();
   raw.groups.erase(raw.groups.begin() + kRight);
@@ -311,7 +325,7 @@ TEST(TransitionPath, DoesNotAllocate) {
     AvatarSimulation avatar(library, BaseFrame{});
     avatar.Advance(1.0 / 60.0);  // The first call allocates scratch memory.
     for (int i = 0; i < 3; ++i) {
-      ASSERT_TRUE(avatar.Enqueue({1, Step(Foot::kLeft, 0.5)}).has_value());
+      ASSERT_TRUE(avatar.Enqueue({1, Step(Foot::kLeft, 0.6)}).has_value());
       ASSERT_TRUE(avatar.Enqueue({2, Step(Foot::kLeft, 0.5)}).has_value());
       ASSERT_TRUE(avatar.Enqueue({3, JumpRequest{.length_m = 0.6}}).has_value());
     }

@@ -322,10 +322,13 @@ void AvatarSimulation::StartTransitionPath(bool is_hurried, PlanScratch& scratch
     PopQueue();
     RejectOutOfReach(taken, *direct);
   } else {
+    const bool is_standing = last_group_ == body_.library->groups().size();
+    const MovementKind from =
+        is_standing ? MovementKind::kStand : body_.library->groups()[last_group_].kind;
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
               .base = base_,
-              .reason = NoPathReason(group().kind, body_.library->group(direct->group).kind)});
+              .reason = NoPathReason(from, body_.library->group(direct->group).kind)});
   }
 }
 

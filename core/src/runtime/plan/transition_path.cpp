@@ -178,7 +178,7 @@ TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRe
 }
 
 const char* NoPathReason(MovementKind from, MovementKind to) {
-  static constexpr std::array<std::array<const char*, 3>, 3> kReasons{
+  static constexpr std::array<std::array<const char*, 3>, 4> kReasons{
       {{"this library has no transition path from step_left to step_left",
         "this library has no transition path from step_left to step_right",
         "this library has no transition path from step_left to jump"},
@@ -187,7 +187,10 @@ const char* NoPathReason(MovementKind from, MovementKind to) {
         "this library has no transition path from step_right to jump"},
        {"this library has no transition path from jump to step_left",
         "this library has no transition path from jump to step_right",
-        "this library has no transition path from jump to jump"}}};
+        "this library has no transition path from jump to jump"},
+       {"this library has no transition path from a stand to step_left",
+        "this library has no transition path from a stand to step_right",
+        "this library has no transition path from a stand to jump"}}};
   return kReasons.at(static_cast<std::size_t>(from)).at(static_cast<std::size_t>(to));
 }
 

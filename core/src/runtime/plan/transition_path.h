@@ -63,7 +63,7 @@ struct TransitionPath {
                                                 const Stance& stance);
 
 /// Returns why there is no path, for example "this library has no transition path from step_left to
-/// jump". The text is in static storage.
+/// jump". `to` is not kStand. The text is in static storage.
 [[nodiscard]] const char* NoPathReason(MovementKind from, MovementKind to);
 
 }  // namespace stridewire
