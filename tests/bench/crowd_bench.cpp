@@ -268,7 +268,7 @@ void Floor(benchmark::State& state, const Library& library) {
   const std::size_t passed = poses / 2 + 3;
   const MotionGroup& group = library->group(0);
   const auto row = static_cast<std::size_t>(library->layout().row_floats);
-  const auto examples = static_cast<std::size_t>(group.example_count);
+  const auto examples = static_cast<std::size_t>(group.row_count());
   const std::size_t points = static_cast<std::size_t>(group.grid_point_count) - passed;
   // The foot plan and the difference pose also occupy whole cache lines.
   const std::size_t plan = (sizeof(PackedFootPlan) / sizeof(float) + 15) / 16 * 16;

@@ -75,7 +75,7 @@ void AddGroupCounters(benchmark::State& state, const MotionGroup& group) {
 void StartMovementAlone(benchmark::State& state, const Library& library, int group_index) {
   const MotionGroup& group = library->group(group_index);
   const auto parameters = Parameters(group);
-  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_row_count()));
   Movement movement;
   std::size_t i = 0;
   for (auto _ : state) {
@@ -115,7 +115,7 @@ void StartCorrected(benchmark::State& state, const Library& library, int group_i
 void SynthesizeStep(benchmark::State& state, const Library& library, int group_index) {
   const MotionGroup& group = library->group(group_index);
   const auto parameters = Parameters(group);
-  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_row_count()));
   Movement movement;
   movement.difference = Pose(library->skeleton().joint_count());
   Pose pose(library->skeleton().joint_count());
@@ -137,7 +137,7 @@ void SynthesizeStep(benchmark::State& state, const Library& library, int group_i
 void EvaluatePose(benchmark::State& state, const Library& library, int group_index) {
   const MotionGroup& group = library->group(group_index);
   const auto parameters = Parameters(group);
-  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_row_count()));
   Movement movement;
   movement.difference = Pose(library->skeleton().joint_count());
   Pose pose(library->skeleton().joint_count());

@@ -203,7 +203,7 @@ void ExpectPose(ConstPoseSpan pose, const char* what) {
 // Evaluates every group at some sites and at points inside and around their hull, over its time.
 void Evaluate(const MotionLibrary& library, Mutator& mutator) {
   const int joints = library.skeleton().joint_count();
-  std::vector<double> scratch(static_cast<std::size_t>(library.max_example_count()));
+  std::vector<double> scratch(static_cast<std::size_t>(library.max_row_count()));
   GridCache cache(library.layout());
   Pose pose(joints);
   Movement movement;

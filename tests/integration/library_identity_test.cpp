@@ -81,7 +81,7 @@ class LibraryIdentity : public testing::TestWithParam<Source> {
     if (found == made.end()) found = made.emplace(source.name, Make(source)).first;
     library_ = &found->second;
     ASSERT_NE(library_->built, nullptr);
-    scratch_.resize(static_cast<std::size_t>(library_->built->max_example_count()));
+    scratch_.resize(static_cast<std::size_t>(library_->built->max_row_count()));
   }
 
   [[nodiscard]] const MotionLibrary& library() const { return *library_->built; }

@@ -32,7 +32,7 @@ struct LocalPose {
 };
 
 Row ExampleRow(const MotionGroup& group, const GridLayout& layout, int point, std::size_t example) {
-  const auto rows = static_cast<std::size_t>(point) * static_cast<std::size_t>(group.example_count);
+  const auto rows = static_cast<std::size_t>(point) * static_cast<std::size_t>(group.row_count());
   return {&group.grid[(rows + example) * static_cast<std::size_t>(layout.row_floats)], layout};
 }
 

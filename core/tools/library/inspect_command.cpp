@@ -48,6 +48,9 @@ int RunInspect(const InspectCommand& command) {
     std::printf("  sum of |w| %.2f max; condition %.1f\n",
                 entry["weights"]["sum_max"].get<double>(),
                 entry["weights"]["condition"].get<double>());
+    if (group.variant_count > 0) {
+      std::printf("  %d variants, blended only to vary equal steps\n", group.variant_count);
+    }
     if (entry.contains("unrefined_error_m")) {
       std::printf("  %d pseudoexamples; without them error %.1f mm max, %.1f mm mean\n",
                   group.site_count - group.example_count,

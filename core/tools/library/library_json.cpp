@@ -96,6 +96,7 @@ Json LibraryToJson(const MotionLibrary& library, bool examples) {
     entry["kind"] = MovementKindName(group.kind);
     entry["examples"] = group.example_count;
     entry["pseudoexamples"] = group.site_count - group.example_count;
+    entry["variants"] = group.variant_count;
     Json parameters = Json::array();
     for (const Parameter& parameter : group.parameters) {
       parameters.push_back({{"name", ParameterText(parameter.name)},

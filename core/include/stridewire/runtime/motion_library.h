@@ -126,11 +126,19 @@ inline constexpr double kEaseOutS = 0.2;
 /// Sites are the points in parameter space where weights are prescribed: first the examples, then
 /// the pseudoexamples. n is the number of examples, m the number of sites and d the number of
 /// parameters.
+///
+/// Variants are captured steps that are not examples: each is one of the steps from which the
+/// examples were averaged or smoothed. Only varied steps blend them (see StrideVariation). v is the
+/// number of variants. A *row* is an example or a variant: row i < n is example i, and row n + i is
+/// variant i.
 struct MotionGroup {
   MovementKind kind = MovementKind::kStepLeft;
   std::vector<Parameter> parameters;  ///< d parameters.
   int example_count = 0;              ///< n.
   int site_count = 0;                 ///< m >= n.
+  int variant_count = 0;              ///< v, 0 to kMaxVariants.
+  /// [variant][parameter]: parameters of the variants, in metres or radians.
+  std::span<const double> variant_parameters;
   /// [site][parameter]: parameters of the sites, in metres or radians.
   std::span<const double> sites;
   std::span<const double> site_weights;  ///< [site - n][example]: weights of pseudoexamples.
@@ -143,11 +151,11 @@ struct MotionGroup {
   std::span<const double> radial;
   std::span<const int> cells;  ///< [interval]: number of grid cells of the keytime interval.
   int grid_point_count = 0;    ///< Sum of `cells`, plus 1.
-  /// [example][interval + 1]: keytimes in seconds since the start. The first one is 0.
+  /// [row][interval + 1]: keytimes in seconds since the start. The first one is 0.
   std::span<const double> keytimes_s;
-  /// [example]: heading at the end, relative to the start.
+  /// [row]: heading at the end, relative to the start.
   std::span<const double> heading_change_rad;
-  /// [grid point][example][row_floats]: rows of the grid, 64-byte aligned.
+  /// [grid point][row][row_floats]: rows of the grid, 64-byte aligned.
   std::span<const float> grid;
   /// [example]: origin, for example "16_21.bvh 0.93-1.47 s".
   std::vector<std::string_view> sources;
@@ -156,12 +164,19 @@ struct MotionGroup {
   /// True if the sources of all examples begin with kCompletedSource. Requests prefer other groups.
   bool is_completed = false;
 
+  /// Number of examples and variants, n + v.
+  [[nodiscard]] int row_count() const { return example_count + variant_count; }
   [[nodiscard]] int parameter_count() const { return static_cast<int>(parameters.size()); }
   [[nodiscard]] int interval_count() const { return static_cast<int>(cells.size()); }
   /// Returns the index of a parameter in this group, or -1.
   [[nodiscard]] int FindParameter(ParameterName name) const;
   [[nodiscard]] std::span<const double> site(int s) const {
     return sites.subspan(static_cast<std::size_t>(s) * parameters.size(), parameters.size());
+  }
+  /// Returns the parameters [d] of a variant.
+  [[nodiscard]] std::span<const double> variant(int i) const {
+    return variant_parameters.subspan(static_cast<std::size_t>(i) * parameters.size(),
+                                      parameters.size());
   }
 };
 
@@ -178,6 +193,7 @@ class MotionLibrary {
   /// Maximum number of groups in a file. Movement records store the index of a group in one byte.
   static constexpr int kMaxGroups = 254;
   static constexpr int kMaxExamples = 4096;    ///< Per group.
+  static constexpr int kMaxVariants = 8;       ///< Per group.
   static constexpr int kMaxGridPoints = 4096;  ///< Per group.
 
   /// Opens a library file. Verifies its header, hash and FlatBuffers structure and validates all
@@ -238,8 +254,8 @@ class MotionLibrary {
   [[nodiscard]] const std::string& hash() const { return hash_; }
   /// Content of the library file, including its header.
   [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
-  /// Maximum number of examples in a group. It determines the size of scratch memory.
-  [[nodiscard]] int max_example_count() const { return max_example_count_; }
+  /// Maximum of MotionGroup::row_count() over the groups. It determines the size of scratch memory.
+  [[nodiscard]] int max_row_count() const { return max_row_count_; }
 
  private:
   MotionLibrary();
@@ -259,7 +275,7 @@ class MotionLibrary {
   std::unique_ptr<const LocomotionProfile> locomotion_profile_;
   std::unique_ptr<const StandMotion> stand_motion_;
   std::string hash_;
-  int max_example_count_ = 0;
+  int max_row_count_ = 0;
   std::span<const std::byte> bytes_;  // Mapped or allocated memory, 64-byte aligned.
   bool is_mapped_ = false;
 };

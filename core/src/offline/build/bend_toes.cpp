@@ -113,7 +113,7 @@ double ToeBender::BallHeightAt(Foot foot, ConstPoseSpan end) const {
 
 template <typename PoseAt, typename TimeAt>
 void ToeBender::BendFrames(MovementKind kind, std::span<const double> keytimes_s, int count,
-                           PoseAt pose_at, TimeAt time_at) const {
+                           double margin_m, PoseAt pose_at, TimeAt time_at) const {
   if (count == 0 || !HasSwing(kind, keytimes_s)) return;
   const std::size_t toe_off = ToeOffKeytime(kind);
   const double from_s = keytimes_s[toe_off];
@@ -126,7 +126,7 @@ void ToeBender::BendFrames(MovementKind kind, std::span<const double> keytimes_s
     for (int i = 0; i < count; ++i) {
       const double swing = std::clamp((time_at(i) - from_s) / over_s, 0.0, 1.0);
       const double ball_m = before_m + swing * (after_m - before_m);
-      RaiseToeTip(skeleton_, rig_, foot, ball_m + rest->tip_rise_m, pose_at(i));
+      RaiseToeTip(skeleton_, rig_, foot, ball_m + rest->tip_rise_m + margin_m, pose_at(i));
     }
   }
 }
@@ -134,7 +134,7 @@ void ToeBender::BendFrames(MovementKind kind, std::span<const double> keytimes_s
 void ToeBender::Bend(MovementKind kind, RawExample& example) const {
   Clip& clip = example.clip;
   BendFrames(
-      kind, example.keytimes_s, clip.frame_count(), [&](int i) { return clip.frame(i); },
+      kind, example.keytimes_s, clip.frame_count(), 0.0, [&](int i) { return clip.frame(i); },
       [&](int i) {
         const auto frame = static_cast<std::size_t>(i);
         return example.frame_times_s.empty() ? i / clip.fps : example.frame_times_s[frame];
@@ -142,7 +142,7 @@ void ToeBender::Bend(MovementKind kind, RawExample& example) const {
 }
 
 void ToeBender::Bend(MovementKind kind, std::span<const int> cells, const GridLayout& layout,
-                     GridExample& example) const {
+                     double margin_m, GridExample& example) const {
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   const auto row_at = [&](std::size_t i) {
     return std::span(example.rows).subspan(i * row_floats, row_floats);
@@ -153,7 +153,7 @@ void ToeBender::Bend(MovementKind kind, std::span<const int> cells, const GridLa
   }
   const TimeWarp warp(example.keytimes_s, cells);
   BendFrames(
-      kind, example.keytimes_s, static_cast<int>(poses.size()),
+      kind, example.keytimes_s, static_cast<int>(poses.size()), margin_m,
       [&](int i) { return PoseSpan(poses[static_cast<std::size_t>(i)]); },
       [&](int i) { return warp.TimeAt(i); });
   for (std::size_t i = 0; i < poses.size(); ++i) {

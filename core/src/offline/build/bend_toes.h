@@ -37,9 +37,10 @@ class ToeBender {
   /// (LegRig::is_usable) or if the example has no swing. Leaves out feet without a toe joint, and
   /// feet that are the fixed foot of no captured step, because their resting heights are unknown.
   void Bend(MovementKind kind, RawExample& example) const;
-  /// Same, but for a resampled example. `cells` are those of its group.
+  /// Same, but for a resampled example. `cells` are those of its group. Toe tips end up at least
+  /// `margin_m` above the minimum height.
   void Bend(MovementKind kind, std::span<const int> cells, const GridLayout& layout,
-            GridExample& example) const;
+            double margin_m, GridExample& example) const;
 
  private:
   struct RestingFoot {
@@ -55,8 +56,8 @@ class ToeBender {
   // `end`: RestingFoot::ball_height_m, or the actual height if the foot is not on level ground.
   [[nodiscard]] double BallHeightAt(Foot foot, ConstPoseSpan end) const;
   template <typename PoseAt, typename TimeAt>
-  void BendFrames(MovementKind kind, std::span<const double> keytimes_s, int count, PoseAt pose_at,
-                  TimeAt time_at) const;
+  void BendFrames(MovementKind kind, std::span<const double> keytimes_s, int count, double margin_m,
+                  PoseAt pose_at, TimeAt time_at) const;
 
   const Skeleton& skeleton_;
   LegRig rig_;

@@ -107,12 +107,12 @@ std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples, s
   return points;
 }
 
-GroupProbe::GroupProbe(const Skeleton& skeleton, int max_example_count)
+GroupProbe::GroupProbe(const Skeleton& skeleton, int max_row_count)
     : skeleton_(skeleton),
       layout_(skeleton.joint_count()),
       cache_(layout_),
       pose_(skeleton.joint_count()),
-      scratch_(skeleton, layout_, max_example_count) {}
+      scratch_(skeleton, layout_, max_row_count) {}
 
 HullPoint GroupProbe::At(const MotionGroup& group, const ParameterValues& p) {
   SetWeights(group, -1, std::span(p.values).first(group.parameters.size()), scratch_.weights(group),
@@ -135,7 +135,7 @@ Correction GroupProbe::Correct(const MotionGroup& group, const ParameterValues& 
 std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads) {
   std::vector<GroupProbe> probes;
   for (int i = 0; i < ThreadCount(threads); ++i) {
-    probes.emplace_back(library.skeleton(), library.max_example_count());
+    probes.emplace_back(library.skeleton(), library.max_row_count());
   }
   return probes;
 }

@@ -28,7 +28,7 @@ struct HullPoint {
 // Evaluates groups with one skeleton. They need not belong to a library. Not thread-safe.
 class GroupProbe {
  public:
-  GroupProbe(const Skeleton& skeleton, int max_example_count);
+  GroupProbe(const Skeleton& skeleton, int max_row_count);
 
   [[nodiscard]] HullPoint At(const MotionGroup& group, const ParameterValues& p);
 

@@ -207,7 +207,8 @@ class Comparer {
     ProjectOntoHull(others.sites, MetricOf(group_), kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
     CorrectWeights(fitted->group, applied, DefaultCorrectionLimits(group_), scratch, movement_);
-    return {movement_.weights.begin(), movement_.weights.end()};
+    return {movement_.weights.begin(),
+            movement_.weights.begin() + static_cast<std::ptrdiff_t>(group_.example_count)};
   }
 
   // Returns the poses of the movement with these weights and planted feet, as an avatar displays
@@ -290,11 +291,7 @@ class Comparer {
       result.keytime_s +=
           std::fabs(true_keys[k] - synthesized_keys[k]) / static_cast<double>(true_keys.size() - 1);
     }
-    movement_.weights.assign(weights.begin(), weights.end());
-    movement_.heading_change_rad = 0.0;
-    for (std::size_t e = 0; e < weights.size(); ++e) {
-      movement_.heading_change_rad += weights[e] * group_.heading_change_rad[e];
-    }
+    ApplyWeights(group_, weights, movement_);
     cache_.Clear();
     result.parameter_m = LargestDifference(
         group_, ValuesOf(group_.site(left_out)),

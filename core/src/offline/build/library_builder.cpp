@@ -17,6 +17,7 @@
 #include "offline/build/select_examples.h"
 #include "offline/build/smooth_examples.h"
 #include "offline/build/smooth_jolts.h"
+#include "offline/build/variants.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/weights/measure.h"
 
@@ -116,24 +117,31 @@ struct StoredGroup {
   std::vector<float> grid;
   std::vector<std::string> sources;
   std::vector<std::uint8_t> mirrored;
+  std::vector<double> variant_parameters;
 
-  StoredGroup(const std::vector<GridExample>& examples, std::vector<int> of_cells,
-              const GridLayout& layout)
+  StoredGroup(const std::vector<GridExample>& examples, const std::vector<GridExample>& variants,
+              std::vector<int> of_cells, const GridLayout& layout)
       : cells(std::move(of_cells)) {
-    const std::size_t n = examples.size();
+    const std::size_t row_count = examples.size() + variants.size();
     const auto row_floats = static_cast<std::size_t>(layout.row_floats);
     const std::size_t points = examples.front().rows.size() / row_floats;
     STRIDEWIRE_CHECK(examples.front().rows.size() == points * row_floats);
-    grid.resize(points * n * row_floats);
-    for (std::size_t e = 0; e < n; ++e) {
-      const GridExample& example = examples[e];
-      keytimes_s.insert(keytimes_s.end(), example.keytimes_s.begin(), example.keytimes_s.end());
-      heading_changes_rad.push_back(example.heading_change_rad);
+    grid.resize(points * row_count * row_floats);
+    for (const GridExample& example : examples) {
       mirrored.push_back(example.mirrored ? 1 : 0);
       sources.push_back(example.source);
       sites.insert(sites.end(), example.parameters.begin(), example.parameters.end());
+    }
+    for (const GridExample& variant : variants) {
+      variant_parameters.insert(variant_parameters.end(), variant.parameters.begin(),
+                                variant.parameters.end());
+    }
+    for (std::size_t i = 0; i < row_count; ++i) {
+      const GridExample& row = i < examples.size() ? examples[i] : variants[i - examples.size()];
+      keytimes_s.insert(keytimes_s.end(), row.keytimes_s.begin(), row.keytimes_s.end());
+      heading_changes_rad.push_back(row.heading_change_rad);
       for (std::size_t p = 0; p < points; ++p) {
-        std::memcpy(&grid[(p * n + e) * row_floats], &example.rows[p * row_floats],
+        std::memcpy(&grid[(p * row_count + i) * row_floats], &row.rows[p * row_floats],
                     row_floats * sizeof(float));
       }
     }
@@ -154,6 +162,8 @@ struct StoredGroup {
     view.grid = grid;
     view.sources.assign(sources.begin(), sources.end());
     view.mirrored = mirrored;
+    view.variant_parameters = variant_parameters;
+    view.variant_count = static_cast<int>(heading_changes_rad.size() - mirrored.size());
     return view;
   }
 };
@@ -205,11 +215,20 @@ class GroupConverter {
     if (group.examples.empty()) return {};
     index_ = static_cast<int>(index);
     const std::vector<int> cells = ChooseCells(group, builder_.grid_fps, layout_, stand_root());
-    std::optional<Smoothness> smoothness;
-    const std::vector<GridExample> examples = SelectExamples(group, cells, smoothness);
-    StoredGroup& stored =
-        *groups_.emplace_back(std::make_unique<StoredGroup>(examples, cells, layout_));
-    return AddView(group, examples, smoothness.has_value(), stored);
+    SelectedSteps selected = SelectExamples(group, cells);
+    if (!selected.variants.empty()) {
+      StoredGroup stored(selected.examples, {}, cells, layout_);
+      if (Status status = AddView(group, selected.examples, selected.is_smooth, stored); !status) {
+        return status;
+      }
+      for (GridExample& variant : selected.variants) {
+        AdaptToBlend(views_.back(), layout_, variant);
+      }
+      views_.pop_back();
+    }
+    StoredGroup& stored = *groups_.emplace_back(
+        std::make_unique<StoredGroup>(selected.examples, selected.variants, cells, layout_));
+    return AddView(group, selected.examples, selected.is_smooth, stored);
   }
 
   [[nodiscard]] const std::vector<MotionGroup>& views() const { return views_; }
@@ -228,9 +247,14 @@ class GroupConverter {
     return examples;
   }
 
-  // Returns the examples to store. Sets `smoothness` if they were smoothed over their parameters.
-  std::vector<GridExample> SelectExamples(const RawGroup& group, const std::vector<int>& cells,
-                                          std::optional<Smoothness>& smoothness) {
+  // The examples and variants of a group that are stored.
+  struct SelectedSteps {
+    std::vector<GridExample> examples;
+    std::vector<GridExample> variants;
+    bool is_smooth = false;  // True if the examples were smoothed over their parameters.
+  };
+
+  SelectedSteps SelectExamples(const RawGroup& group, const std::vector<int>& cells) {
     std::vector<GridExample> found = Resample(group, cells);
     std::vector<double> units(group.parameters.size(), 1.0);
     for (std::size_t l = 0; l < units.size(); ++l) {
@@ -243,50 +267,59 @@ class GroupConverter {
     const SelectionOptions& options = selects ? builder_.selection : SelectionOptions();
     Selected selected =
         SelectExamplesJob{found, units, diameter, options, layout_, raw_.skeleton, group}.Run();
-    std::vector<GridExample> examples = std::move(selected.examples);
+    SelectedSteps steps{std::move(selected.examples), {}, false};
+    std::vector<GridExample>& examples = steps.examples;
     GroupSelection& report = selected.report;
     report.group = index_;
     STRIDEWIRE_CHECK(!examples.empty() && examples.size() == selected.clusters.size());
     NoteSelection(report, examples.size());
     if (builder_.smooths && selects) {
-      std::size_t i = 0;
-      std::erase_if(found, [&](const GridExample&) {
-        return report.examples[i++].fate == ExampleFate::kOutlier;
-      });
-      smoothness = Smooth(group, found, cells, examples);
+      const std::optional<Smoothness> smoothness = Smooth(group, found, report, cells, examples);
+      if (smoothness) {
+        steps.is_smooth = true;
+        report.ridge = smoothness->ridge;
+        report.ridge_radius = smoothness->radius;
+        Note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
+      }
+      if (IsStep(group.kind)) {
+        steps.variants = ChooseVariants(found, report.examples, units, steps.is_smooth);
+        SmoothNoise(steps);
+      }
     }
-    if (smoothness) {
-      report.ridge = smoothness->ridge;
-      report.ridge_radius = smoothness->radius;
-      Note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
-    }
-    if (builder_.smooths && selects && IsStep(group.kind)) SmoothNoise(examples);
     // The toes bend last, so that the selection does not depend on them.
     if (toes_ && selects) {
-      for (GridExample& example : examples) toes_->Bend(group.kind, cells, layout_, example);
+      for (GridExample& example : examples) toes_->Bend(group.kind, cells, layout_, 0.0, example);
+      for (GridExample& variant : steps.variants) {
+        toes_->Bend(group.kind, cells, layout_, kVariantToeMarginM, variant);
+      }
     }
     STRIDEWIRE_CHECK(report.examples.size() == group.examples.size());
     builder_.selections.push_back(std::move(report));
-    return examples;
+    return steps;
   }
 
   // Smooths `examples` over their parameters: replaces the motion of each with the value, at its
-  // parameters, of smooth functions fitted to all examples in `found`.
-  std::optional<Smoothness> Smooth(const RawGroup& group, const std::vector<GridExample>& found,
-                                   const std::vector<int>& cells,
+  // parameters, of smooth functions fitted to all examples in `found` that are not outliers.
+  std::optional<Smoothness> Smooth(const RawGroup& group, std::vector<GridExample> found,
+                                   const GroupSelection& report, const std::vector<int>& cells,
                                    std::vector<GridExample>& examples) const {
-    const StoredGroup stored(found, cells, layout_);
+    std::size_t i = 0;
+    std::erase_if(found, [&](const GridExample&) {
+      return report.examples[i++].fate == ExampleFate::kOutlier;
+    });
+    const StoredGroup stored(found, {}, cells, layout_);
     MotionGroup view = stored.View();
     view.kind = group.kind;
     view.parameters = ParametersOf(group, found);
     return SmoothExamples(view, layout_, raw_.skeleton, examples);
   }
 
-  void SmoothNoise(std::vector<GridExample>& examples) {
+  void SmoothNoise(SelectedSteps& steps) {
     int smoothed = 0;
-    for (GridExample& example : examples) {
+    for (GridExample& example : steps.examples) {
       smoothed += SmoothJolts(raw_.skeleton, layout_, example) ? 1 : 0;
     }
+    for (GridExample& variant : steps.variants) SmoothJolts(raw_.skeleton, layout_, variant);
     if (smoothed > 0) {
       Note(std::to_string(smoothed) + " examples smoothed where joints jolt");
     }

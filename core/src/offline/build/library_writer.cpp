@@ -34,6 +34,8 @@ flatbuffers::Offset<fb::Group> AddGroup(Builder& builder, const MotionGroup& gro
   STRIDEWIRE_CHECK(group.sources.size() == static_cast<std::size_t>(group.example_count));
   STRIDEWIRE_CHECK(group.sites.size() ==
                    static_cast<std::size_t>(group.site_count) * group.parameters.size());
+  STRIDEWIRE_CHECK(group.variant_parameters.size() ==
+                   static_cast<std::size_t>(group.variant_count) * group.parameters.size());
   STRIDEWIRE_CHECK(group.dilations.size() == static_cast<std::size_t>(group.site_count));
   std::vector<flatbuffers::Offset<flatbuffers::String>> sources;
   for (const std::string_view source : group.sources) {
@@ -56,9 +58,12 @@ flatbuffers::Offset<fb::Group> AddGroup(Builder& builder, const MotionGroup& gro
   const auto headings = AddVector(builder, group.heading_change_rad);
   const auto sources_offset = builder.CreateVector(sources);
   const auto mirrored = AddVector(builder, group.mirrored);
+  const auto variants =
+      group.variant_parameters.empty() ? 0 : AddVector(builder, group.variant_parameters);
   return fb::CreateGroup(builder, static_cast<std::uint8_t>(group.kind), parameters_offset,
                          group.example_count, sites, site_weights, dilations, linear, radial, cells,
-                         keytimes, headings, grid, sources_offset, mirrored, group.radius_factor);
+                         keytimes, headings, grid, sources_offset, mirrored, group.radius_factor,
+                         variants);
 }
 
 flatbuffers::Offset<fb::Layer> AddLayer(Builder& builder, const LayerClip& layer) {

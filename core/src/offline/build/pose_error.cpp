@@ -131,8 +131,8 @@ std::vector<Pose> PosesAtGridPoints(const MotionGroup& group, const GridLayout& 
                                     std::span<const double> weights) {
   STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group.example_count));
   Movement movement;
+  ApplyWeights(group, weights, movement);
   movement.group = 0;
-  movement.weights.assign(weights.begin(), weights.end());
   GridCache cache(layout);
   std::vector<Pose> poses;
   for (int p = 0; p < group.grid_point_count; ++p) {

@@ -108,7 +108,7 @@ class MomentReader {
   }
 
   std::vector<DVec3> PointsOf(const MotionGroup& group, int example, int point) {
-    const auto n = static_cast<std::size_t>(group.example_count);
+    const auto n = static_cast<std::size_t>(group.row_count());
     const std::size_t row = static_cast<std::size_t>(point) * n + static_cast<std::size_t>(example);
     const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
     return PointsOf(PoseOfRow(group.grid.subspan(row * row_floats, row_floats), layout_,

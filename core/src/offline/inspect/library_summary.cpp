@@ -107,7 +107,7 @@ class Summarizer {
   double ReadPose(const MotionGroup& group, int example, int point) {
     const GridLayout& layout = library_.layout();
     const float* row = group.grid.data() + (static_cast<std::size_t>(point) *
-                                                static_cast<std::size_t>(group.example_count) +
+                                                static_cast<std::size_t>(group.row_count()) +
                                             static_cast<std::size_t>(example)) *
                                                static_cast<std::size_t>(layout.row_floats);
     const GridLayout::Root root = layout.RootOf(row);

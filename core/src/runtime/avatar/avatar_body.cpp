@@ -14,7 +14,7 @@ void Reserve(const MotionLibrary& library, Movement& movement) {
   const int joint_count = library.skeleton().joint_count();
   movement.difference = Pose(joint_count);
   movement.difference_velocity.joints_rad_s.resize(static_cast<std::size_t>(joint_count));
-  movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
+  movement.weights.reserve(static_cast<std::size_t>(library.max_row_count()));
 }
 
 AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of_library)
@@ -88,7 +88,7 @@ void AvatarBody::SetStartOffset(double time_s) {
 template <typename Landing>
 void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScratch& scratch) {
   STRIDEWIRE_CHECK(movement.group >= 0);
-  STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group().example_count));
+  STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group().row_count()));
   STRIDEWIRE_CHECK(movement.start_offset_s < movement.duration_s());
   STRIDEWIRE_CHECK(!plants_feet || library->leg_rig().is_usable);
   std::optional<ConstPoseSpan> earlier;

@@ -126,7 +126,7 @@ void ReadWeights(const MotionLibrary& library, bool plants_feet, Movement& movem
     return;
   }
   movement.group = group;
-  movement.weights.resize(static_cast<std::size_t>(library.group(group).example_count));
+  movement.weights.resize(static_cast<std::size_t>(library.group(group).row_count()));
   double sum = 0.0;
   double magnitude = 0.0;
   for (float& weight : movement.weights) {

@@ -151,7 +151,7 @@ std::size_t MaxRecordBytes(const MotionLibrary& library) {
   // The plan, foot locks, corrections and four layers take about 1,700 bytes. A record contains at
   // most three poses of 16 bytes per joint, or one pose and its velocity.
   return 2000 + 48 * static_cast<std::size_t>(library.skeleton().joint_count()) +
-         4 * static_cast<std::size_t>(library.max_example_count());
+         4 * static_cast<std::size_t>(library.max_row_count());
 }
 
 }  // namespace stridewire

@@ -238,8 +238,26 @@ Status LoadWeights(const fb::Group& from, MotionGroup& group) {
   return CheckWeightTables(group);
 }
 
+Status LoadVariants(const fb::Group& from, MotionGroup& group) {
+  const std::size_t d = group.parameters.size();
+  group.variant_parameters = ToSpan(from.variant_parameters());
+  const std::size_t variants = group.variant_parameters.size() / d;
+  if (group.variant_parameters.size() % d != 0 || variants > MotionLibrary::kMaxVariants) {
+    return Fail(ErrorCode::kMalformed, "a group's variant count is out of range",
+                static_cast<std::int64_t>(variants));
+  }
+  if (!AllWithin(group.variant_parameters, kMaxParameter)) {
+    return Fail(ErrorCode::kMalformed, "a variant's parameter is out of range");
+  }
+  if (variants > 0 && !IsStep(group.kind)) {
+    return Fail(ErrorCode::kMalformed, "a group that has no steps has variants");
+  }
+  group.variant_count = static_cast<int>(variants);
+  return {};
+}
+
 Status LoadTimes(const fb::Group& from, MotionGroup& group) {
-  const auto n = static_cast<std::size_t>(group.example_count);
+  const auto n = static_cast<std::size_t>(group.row_count());
   group.cells = ToSpan(from.cells());
   const std::size_t intervals = group.cells.size();
   if (intervals < 1 || intervals > static_cast<std::size_t>(kMaxIntervals)) {
@@ -278,7 +296,7 @@ Status LoadTimes(const fb::Group& from, MotionGroup& group) {
 
 Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joints,
                 MotionGroup& group) {
-  const auto n = static_cast<std::size_t>(group.example_count);
+  const auto n = static_cast<std::size_t>(group.row_count());
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   group.grid = ToSpan(from.grid());
   if (group.grid.size() != static_cast<std::size_t>(group.grid_point_count) * n * row_floats) {
@@ -325,6 +343,7 @@ Expected<MotionGroup> LoadGroup(const fb::Group& from, const GridLayout& layout,
   const auto n = static_cast<std::size_t>(group.example_count);
   if (Status status = LoadParameters(from, group); !status) return std::unexpected(status.error());
   if (Status status = LoadWeights(from, group); !status) return std::unexpected(status.error());
+  if (Status status = LoadVariants(from, group); !status) return std::unexpected(status.error());
   if (Status status = LoadTimes(from, group); !status) return std::unexpected(status.error());
   if (Status status = LoadGrid(from, layout, joints, group); !status) {
     return std::unexpected(status.error());
@@ -594,7 +613,7 @@ Status MotionLibrary::LoadContent() {
   for (const fb::Group* from : *root.groups()) {
     Expected<MotionGroup> group = LoadGroup(*from, layout_, joints);
     if (!group) return std::unexpected(group.error());
-    max_example_count_ = std::max(max_example_count_, group->example_count);
+    max_row_count_ = std::max(max_row_count_, group->row_count());
     groups_.push_back(std::move(*group));
   }
   file_group_count_ = groups_.size();

@@ -35,12 +35,20 @@ void SetWeights(const MotionGroup& group, int group_index, std::span<const doubl
 
 void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement) {
   STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group.example_count));
-  movement.weights.resize(weights.size());
+  movement.weights.assign(static_cast<std::size_t>(group.row_count()), 0.0f);
   movement.heading_change_rad = 0.0;
   for (std::size_t e = 0; e < weights.size(); ++e) {
     movement.weights[e] = static_cast<float>(weights[e]);
     movement.heading_change_rad += weights[e] * group.heading_change_rad[e];
   }
+}
+
+void AddVariant(const MotionGroup& group, int variant, double weight, Movement& movement) {
+  STRIDEWIRE_CHECK(variant >= 0 && variant < group.variant_count);
+  const std::size_t row =
+      static_cast<std::size_t>(group.example_count) + static_cast<std::size_t>(variant);
+  movement.weights[row] += static_cast<float>(weight);
+  movement.heading_change_rad += weight * group.heading_change_rad[row];
 }
 
 void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
@@ -51,7 +59,7 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
 
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement,
                    double rate) {
-  STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group.example_count));
+  STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group.row_count()));
   STRIDEWIRE_CHECK(rate > 0.0);
   movement.base = base;
   movement.extra_turn_rad = 0.0;

@@ -44,7 +44,7 @@ struct Movement {
   double start_offset_s = 0.0;
   double ease_out_s = kEaseOutS;  ///< Seconds over which the difference pose fades out (T).
   double rate = 1.0;              ///< Playback speed relative to the examples, > 0.
-  std::vector<float> weights;     ///< [example]: blend weights, whose sum is 1.
+  std::vector<float> weights;     ///< [row]: blend weights, whose sum is 1.
   /// Difference pose D = P - M in world space. P is the last pose of the previous movement, without
   /// planting if the feet are planted. M is the blended pose of this movement at start_offset_s.
   Pose difference;
@@ -72,8 +72,12 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
 void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
                 std::span<double> weight_scratch, Movement& movement);
 
-/// Replaces the weights [n] of a movement, and sets the heading change that follows from them.
+/// Replaces the weights of a movement with those of the examples [n] and 0 for the variants, and
+/// sets the heading change that follows from them.
 void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement);
+
+/// Adds `weight` to the weight of a variant, and updates the heading change.
+void AddVariant(const MotionGroup& group, int variant, double weight, Movement& movement);
 
 /// Performs the rest of StartMovement for a movement whose group, parameters and weights are set.
 /// `rate` divides all keytimes, so that all times of the movement are in seconds of the avatar.

@@ -8,6 +8,11 @@ namespace {
 // Maps random bits to a number in [-1, 1).
 double SignedFractionOf(std::uint64_t bits) { return 2.0 * FractionOf(bits) - 1.0; }
 
+// Numbers of the random values of one step. Those of WeightDirection begin at 1 and end at the
+// maximum number of examples.
+constexpr std::uint64_t kVariantWeight = 100'000;
+constexpr std::uint64_t kFirstVariant = 100'001;
+
 }  // namespace
 
 StrideVariation::StrideVariation(std::uint64_t seed, std::uint64_t movement_number)
@@ -20,6 +25,14 @@ double StrideVariation::RateFactor() const {
 
 double StrideVariation::WeightDirection(std::size_t example) const {
   return SignedFractionOf(Scramble(bits_ + 1 + example));
+}
+
+double StrideVariation::VariantScore(int variant) const {
+  return FractionOf(Scramble(bits_ + kFirstVariant + static_cast<std::uint64_t>(variant)));
+}
+
+double StrideVariation::VariantWeight() const {
+  return 0.5 + 0.5 * FractionOf(Scramble(bits_ + kVariantWeight));
 }
 
 }  // namespace stridewire

@@ -25,6 +25,13 @@ class StrideVariation {
   /// weights of the step deviate.
   [[nodiscard]] double WeightDirection(std::size_t example) const;
 
+  /// Returns a number in [0, 1) for a variant of a group (see MotionGroup), by which ChooseVariant
+  /// chooses among them.
+  [[nodiscard]] double VariantScore(int variant) const;
+
+  /// Returns the weight of the chosen variant if it fits perfectly, in [0.5, 1).
+  [[nodiscard]] double VariantWeight() const;
+
  private:
   std::uint64_t bits_;
   std::uint64_t previous_bits_;

@@ -53,7 +53,7 @@ void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const
       sum = 0.0f;
       for (int k = 0; k < 4; ++k) {
         const auto examples = static_cast<std::size_t>(GridPointOf(group, sample, k)) *
-                              static_cast<std::size_t>(group.example_count);
+                              static_cast<std::size_t>(group.row_count());
         sum += sample.weights[static_cast<std::size_t>(k)] *
                group.grid[(examples + largest) * row_floats + i];
       }

@@ -153,7 +153,7 @@ void SoaPoseEvaluator::Work::BlendRows() {
     std::size_t end = i + 1;
     while (end < lanes && end - i < kMaxBlended && movement(end).group == movement(i).group) ++end;
     kernels::BlendRows({.grid = group(i).grid.data(),
-                        .examples = static_cast<std::size_t>(group(i).example_count),
+                        .examples = static_cast<std::size_t>(group(i).row_count()),
                         .row_floats = row_floats,
                         .point_count = group(i).grid_point_count,
                         .lane = i,

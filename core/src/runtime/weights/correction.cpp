@@ -7,6 +7,7 @@
 #include "base/check.h"
 #include "runtime/pose/pose_kernels.h"
 #include "runtime/weights/measure.h"
+#include "runtime/weights/variant_choice.h"
 
 namespace stridewire {
 namespace {
@@ -29,13 +30,17 @@ constexpr double kShrinkErrorM = 1e-4;
 // examples do not span all parameters.
 constexpr double kRidge = 1e-9;
 constexpr int kMaxHalvings = 3;
-// Stride variation changes poses only in groups with at most this many parameters, that is, in
-// straight steps. Other steps are rarely repeated. Their examples differ so much that soles would
-// enter the ground.
+// Steps vary in pose only in groups with at most this many parameters, that is, if they are
+// straight. Other steps are rarely repeated. Their examples differ so much that soles would enter
+// the ground.
 constexpr std::size_t kMaxVariedParameters = 2;
 // Size of a variation in radians, as measured by PoseChange. Larger variations push toes into the
 // ground in steps of the generated library.
 constexpr double kVariedRad = 0.04;
+// Maximum size of the difference between a variant and a blend, as measured by PoseChange. With
+// larger differences, knees that bend quickly when a foot lands would bend even more quickly.
+constexpr double kVariantRad = 0.5;
+constexpr double kTiny = 1e-9;
 // Fractions of a step at which PoseChange measures the pose.
 constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
 // Maximum change of a weight relative to its value, before the effect on the parameters is removed.
@@ -102,9 +107,10 @@ void SolveFactored(const Matrix& factor, std::size_t rows, Vector& right) {
 // Solves for the change of the weights in one Gauss-Newton iteration (see CorrectWeights).
 class WeightStep {
  public:
-  // `slopes` is J, [d][n], in metres.
-  WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d)
-      : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1) {
+  // `slopes` is J, [d][n], in metres. `total` is the sum of the corrected weights.
+  WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d,
+             double total)
+      : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1), total_(total) {
     min_usage_ = kMinUsage * SumOfMagnitudes(weights) / static_cast<double>(n_);
     for (std::size_t e = 0; e < n_; ++e) total_usage_ += Usage(e);
     for (std::size_t a = 0; a < rows_; ++a) {
@@ -126,7 +132,7 @@ class WeightStep {
   // not affect the parameters shrinks by the fraction `shrinking`.
   void Solve(const Vector& missing, double shrinking, std::span<double> out) const {
     Vector y = missing;
-    y[rows_ - 1] = 1.0 - Sum(weights_);
+    y[rows_ - 1] = total_ - Sum(weights_);
     if (shrinking > 0.0) {
       for (std::size_t a = 0; a < rows_; ++a) {
         for (std::size_t e = 0; e < n_; ++e) y[a] += shrinking * At(a, e) * weights_[e];
@@ -136,7 +142,7 @@ class WeightStep {
     for (std::size_t e = 0; e < n_; ++e) {
       out[e] = (1.0 - shrinking) * weights_[e] + Usage(e) * Combine(y, e);
     }
-    SetSum(1.0, out);
+    SetSum(total_, out);
   }
 
   // Writes the change of the weights [n] in the direction of `variation`, without the part that
@@ -172,6 +178,7 @@ class WeightStep {
   std::span<const double> slopes_;
   std::size_t n_;
   std::size_t rows_;
+  double total_;
   double min_usage_ = 0.0;
   double total_usage_ = 0.0;
   Matrix factor_{};
@@ -202,7 +209,6 @@ double PoseChange(const MotionGroup& group, const GridLayout& layout,
 // The change is scaled to kVariedRad, or less if the limits on weights require it.
 void AddVariation(std::span<const double> change, double size_rad, double max_sum,
                   std::span<double> weights) {
-  constexpr double kTiny = 1e-9;
   const double scale = std::min(kMaxRelativeChange, kVariedRad / std::max(size_rad, kTiny));
   double sum = 0.0;
   for (std::size_t e = 0; e < weights.size(); ++e) {
@@ -230,10 +236,11 @@ CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group) {
 }
 
 CorrectionScratch::CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout,
-                                     int max_example_count)
+                                     int max_row_count)
     : ends_(skeleton, layout) {
-  STRIDEWIRE_CHECK(max_example_count >= 0 && max_example_count <= MotionLibrary::kMaxExamples);
-  const auto n = static_cast<std::size_t>(max_example_count);
+  STRIDEWIRE_CHECK(max_row_count >= 0 &&
+                   max_row_count <= MotionLibrary::kMaxExamples + MotionLibrary::kMaxVariants);
+  const auto n = static_cast<std::size_t>(max_row_count);
   weights_.resize(n);
   next_.resize(n);
   halved_.resize(n);
@@ -241,7 +248,7 @@ CorrectionScratch::CorrectionScratch(const Skeleton& skeleton, const GridLayout&
 }
 
 CorrectionScratch::CorrectionScratch(const MotionLibrary& library)
-    : CorrectionScratch(library.skeleton(), library.layout(), library.max_example_count()) {}
+    : CorrectionScratch(library.skeleton(), library.layout(), library.max_row_count()) {}
 
 Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
                           const CorrectionLimits& limits, CorrectionScratch& scratch,
@@ -264,8 +271,13 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
     Vector missing{};  // p^ - a(w).
     double largest_m = 0.0;
   };
-  const auto measure = [&](std::span<const double> w) {
+  VariantShare share;
+  const auto apply = [&](std::span<const double> w) {
     ApplyWeights(group, w, movement);
+    if (share.variant >= 0) AddVariant(group, share.variant, share.weight, movement);
+  };
+  const auto measure = [&](std::span<const double> w) {
+    apply(w);
     ends.Blend(movement);
     const ParameterValues measured = ends.Measure();
     ParameterError error;
@@ -278,20 +290,33 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
 
   SetWeights(group, -1, std::span(wanted.values).first(d), weights, movement);
   LimitNegativeWeights(limits.start_weight_sum, weights);
-  const double max_sum = std::max(limits.weight_sum, SumOfMagnitudes(weights));
+  double max_sum = std::max(limits.weight_sum, SumOfMagnitudes(weights));
   const bool is_varied = variation.has_value() && d <= kMaxVariedParameters;
-  if (is_varied) {
+  if (is_varied && group.variant_count == 0) {
     for (std::size_t l = 0; l < d; ++l) {
       for (std::size_t e = 0; e < n; ++e) {
         slopes[l * n + e] = unit[l] * group.site(static_cast<int>(e))[l];
       }
     }
-    const WeightStep step(weights, slopes, d);
+    const WeightStep step(weights, slopes, d, 1.0);
     if (step.is_solvable()) {
       step.Vary(*variation, next);
       ApplyWeights(group, next, movement);
       AddVariation(next, PoseChange(group, ends.layout(), movement.weights), max_sum, weights);
     }
+  }
+  if (is_varied) share = ChooseVariant(group, wanted, *variation);
+  if (share.variant >= 0) {
+    const ParameterValues applied = movement.parameters;
+    SetWeights(group, -1, group.variant(share.variant), next, movement);
+    movement.parameters = applied;
+    for (double& weight : next) weight = -weight;
+    ApplyWeights(group, next, movement);
+    AddVariant(group, share.variant, 1.0, movement);
+    const double size_rad = PoseChange(group, ends.layout(), movement.weights);
+    share.weight *= std::min(1.0, kVariantRad / std::max(size_rad, kTiny));
+    for (std::size_t e = 0; e < n; ++e) weights[e] += share.weight * next[e];
+    max_sum = std::max(max_sum, SumOfMagnitudes(weights));
   }
   ParameterError best = measure(weights);
   Correction correction;
@@ -302,7 +327,7 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
     for (std::size_t l = 0; l < d; ++l) {
       for (std::size_t e = 0; e < n; ++e) slopes[l * n + e] *= unit[l];
     }
-    const WeightStep step(weights, slopes, d);
+    const WeightStep step(weights, slopes, d, 1.0 - share.weight);
     if (!step.is_solvable()) break;
     step.Solve(best.missing, 0.0, next);
     const double size = SumOfMagnitudes(next);
@@ -334,7 +359,7 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
   if (is_varied && best.largest_m > kMaxVariedErrorM) {
     return CorrectWeights(group, wanted, limits, scratch, movement);
   }
-  ApplyWeights(group, weights, movement);
+  apply(weights);
   correction.error_m = best.largest_m;
   STRIDEWIRE_CHECK(!(correction.error_m > correction.initial_error_m));
   return correction;

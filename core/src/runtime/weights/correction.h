@@ -52,8 +52,8 @@ struct Correction {
 /// Memory for CorrectWeights. It is allocated once and serves all corrections. Use one per thread.
 class CorrectionScratch {
  public:
-  /// Allocates memory for groups of up to `max_example_count` examples. Borrows `skeleton`.
-  CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout, int max_example_count);
+  /// Allocates memory for groups of up to `max_row_count` rows. Borrows `skeleton`.
+  CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout, int max_row_count);
   /// Allocates memory for all groups of a library, which must outlive the scratch.
   explicit CorrectionScratch(const MotionLibrary& library);
 
@@ -93,9 +93,15 @@ class CorrectionScratch {
 /// never worse than without correction. An error remains if no weights within the limit reach p^,
 /// or if the iterations do not suffice.
 ///
-/// With `variation`, the weights of groups with one or two parameters deviate before they are
-/// corrected. The part of the deviation that changes the parameters is removed to first order, with
-/// D as above. The rest is scaled to a fixed change of the pose, or less if the limits require it.
+/// With `variation`, steps of groups with one or two parameters deviate before they are corrected:
+///
+/// - If the group has variants, the difference between one of them (see ChooseVariant) and the
+///   blend for its parameters is added, scaled so that the pose changes by at most a fixed amount.
+///   The sum of |w| of the examples may then exceed its limit.
+/// - In other groups, the weights deviate at random. The part of the deviation that changes the
+///   parameters is removed to first order, with D as above. The rest is scaled to a fixed change of
+///   the pose, or less if the limits require it.
+///
 /// If the correction then leaves an error above 0.1 mm, it is repeated without variation.
 ///
 /// Sets movement.group to -1. If the group is part of a library, the caller must set the index

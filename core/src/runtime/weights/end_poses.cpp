@@ -69,7 +69,7 @@ void EndPoses::SetGroup(const MotionGroup& group) {
 
 const float* EndPoses::Rows(bool is_end) const {
   const std::size_t point = is_end ? static_cast<std::size_t>(group_->grid_point_count - 1) : 0;
-  return &group_->grid[point * static_cast<std::size_t>(group_->example_count) *
+  return &group_->grid[point * static_cast<std::size_t>(group_->row_count()) *
                        static_cast<std::size_t>(layout_.row_floats)];
 }
 

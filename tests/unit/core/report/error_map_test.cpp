@@ -25,7 +25,7 @@ class ErrorMapOfBuiltin : public testing::Test {
   // Computes e(p) directly, by synthesizing and measuring the movement.
   [[nodiscard]] double Direct(int g, const std::vector<double>& p) const {
     const MotionGroup& group = library_->group(g);
-    std::vector<double> scratch(static_cast<std::size_t>(library_->max_example_count()));
+    std::vector<double> scratch(static_cast<std::size_t>(library_->max_row_count()));
     Movement movement;
     StartMovement(group, g, p, {}, scratch, movement);
     GridCache cache(library_->layout());

@@ -72,7 +72,7 @@ TEST(BendToes, TipsThatSinkWhenTheFootPushesOffStayOnTheGround) {
         ResampleOnGrid(step, cells, layout, steps.library.stand_pose.rotations[0]);
     ASSERT_LT(lowest_tip_m(before), -0.015);
     GridExample after = before;
-    bender.Bend(group.kind, cells, layout, after);
+    bender.Bend(group.kind, cells, layout, 0.0, after);
     EXPECT_GT(lowest_tip_m(after), -kMaxToeSinkM - 1e-4);
     for (std::size_t at = 0; at < after.rows.size(); at += layout.row_floats) {
       const Pose then = pose_at(before, at);

@@ -32,7 +32,7 @@ struct Measured {
 };
 Measured MeasureAt(const MotionLibrary& library, int group_index, const ParameterValues& p) {
   const MotionGroup& group = library.group(group_index);
-  std::vector<double> scratch(static_cast<std::size_t>(library.max_example_count()));
+  std::vector<double> scratch(static_cast<std::size_t>(library.max_row_count()));
   Movement movement;
   GridCache cache(library.layout());
   Pose pose(library.skeleton().joint_count());

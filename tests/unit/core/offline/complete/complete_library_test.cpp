@@ -163,7 +163,7 @@ TEST(CompleteLibrary, FramesAreGridPoints) {
       const Clip& clip = raw.groups[g].examples[static_cast<std::size_t>(e)].clip;
       ASSERT_EQ(group.grid_point_count, clip.frame_count());
       for (int p = 0; p < group.grid_point_count; ++p) {
-        const auto row = static_cast<std::size_t>(p * group.example_count + e);
+        const auto row = static_cast<std::size_t>(p * group.row_count() + e);
         const auto floats = static_cast<std::size_t>(layout.row_floats);
         const Vec3 stored(layout.RootOf(&group.grid[row * floats]).position_m);
         ASSERT_EQ(stored, clip.frame(p).root_position_m);

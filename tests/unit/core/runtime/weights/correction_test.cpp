@@ -26,10 +26,10 @@ namespace {
 struct Scratch {
   explicit Scratch(const MotionLibrary& library)
       : correction(library),
-        weights(static_cast<std::size_t>(library.max_example_count())),
+        weights(static_cast<std::size_t>(library.max_row_count())),
         cache(library.layout()),
         pose(library.skeleton().joint_count()) {
-    movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
+    movement.weights.reserve(static_cast<std::size_t>(library.max_row_count()));
   }
   Correction Correct(const MotionLibrary& library, const ParameterValues& wanted,
                      const CorrectionLimits& limits) {
