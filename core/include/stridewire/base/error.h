@@ -22,7 +22,7 @@ enum class ErrorCode : std::uint8_t {
   kIo,               ///< An operating system call failed.
 };
 
-/// An error with its code, a fixed sentence and its location. Code that reads files or checks input
+/// An error: a code, a fixed sentence and a location. Code that reads files or checks input
 /// sets `where`. Other code leaves it empty, so that reporting an error does not allocate.
 struct Error {
   ErrorCode code = ErrorCode::kInvalidArgument;

@@ -134,8 +134,7 @@ struct AvatarOptions {
   bool idle_motion = true;
   /// True: the duration and the pose of steps vary slightly, like the steps of people. Steps meet
   /// their parameters and footprints as accurately as without variation. Steps with `exact_only` do
-  /// not vary. The default is false, because each avatar needs a different `seed`. The server and
-  /// the command `synthesize` set both options.
+  /// not vary. The default is false, because each avatar needs a different `seed`.
   bool stride_variation = false;
   /// Determines the starting point in the loop of the idle motion, and the variation of steps, so
   /// that avatars of a crowd do not move in unison.
@@ -181,8 +180,8 @@ class Avatar {
   int CancelQueue();
 
   /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not
-  /// exist, kOutOfRange if a number is not finite or out of its range, kLimitExceeded if four
-  /// layers are already playing.
+  /// exist, kOutOfRange if a number is not finite or out of its range, kLimitExceeded if
+  /// another layer would have to start while four layers are playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
   /// Moves the avatar to `start` at once. It then stands. Drops the current movement and the queue,
@@ -209,7 +208,7 @@ class Avatar {
   [[nodiscard]] const BaseFrame& base() const;
   /// Number of requests that have not started, plus 1 while a walk is in progress.
   [[nodiscard]] int queue_size() const;
-  /// True if the avatar stands still and its queue is empty.
+  /// True if the queue is empty and no movement or requested stand is in progress.
   [[nodiscard]] bool idle() const;
   [[nodiscard]] bool foot_planting() const;
   [[nodiscard]] const MotionLibrary& library() const;
@@ -256,8 +255,8 @@ struct WalkSpeeds {
   [[nodiscard]] bool IsOutside(double speed_m_s) const;
 };
 
-/// Measures the range by simulating a fast and a slow walk of a few metres. Takes about as long as
-/// planning 30 steps. The same library gives the same values on every machine.
+/// Measures the range by simulating a fast and a slow walk of a few metres. The same library gives
+/// the same values on every machine.
 [[nodiscard]] WalkSpeeds MeasureWalkSpeeds(const std::shared_ptr<const MotionLibrary>& library);
 
 }  // namespace stridewire

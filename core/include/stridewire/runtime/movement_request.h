@@ -95,11 +95,9 @@ enum class Interrupt : std::uint8_t {
   /// jump in progress continues to its landing. A stand waits for the end of a step that brings the
   /// feet together. The queue is dropped.
   ///
-  /// The current step can change while more than 40 % of its swing remains. If the request is a
-  /// step of the swinging foot, the foot is redirected to the new footprint. Requests of other
-  /// kinds change the step only if feet are planted: a walk that begins with a step of the swinging
-  /// foot redirects it, and for a stand or jump, the step is shortened. If possible, the shortened
-  /// step brings the feet together.
+  /// While more than 40 % of a swing remains, a requested step of the swinging foot redirects this
+  /// foot to the new footprint. If feet are planted, a walk that begins with a step of this foot
+  /// redirects it as well. A stand or jump then shortens a step that would end with the feet apart.
   kNow,
 };
 

@@ -28,9 +28,9 @@ struct EndSite {
   Vec3 offset_m = Vec3(0.0f);  ///< Position in the frame of that joint.
 };
 
-/// Indices of the joints of one leg. Positions of feet are measured at the ball, because a standing
-/// foot rolls: during a step, the ankle drifts by 6.5 cm, but the ball only by 3.6 cm. If the
-/// skeleton has no toe joint, `ball` is the ankle, and `ball_offset_m` is the position of the ball.
+/// Indices of the joints of one leg. Positions of feet are measured at the ball, which moves less
+/// than the ankle while a standing foot rolls. If the skeleton has no toe joint, `ball` is the
+/// index of the ankle.
 struct Leg {
   int hip = -1;
   int knee = -1;

@@ -14,8 +14,8 @@
 namespace stridewire {
 namespace {
 
-// Tolerances within which a foot is on its footprint. They are slightly below the documented
-// tolerance of 1 mm. Planting is 100 times as accurate.
+// Tolerances within which a foot is on its footprint. That of the distance is slightly below the
+// documented tolerance of 1 mm.
 constexpr double kMetM = 0.9e-3;
 constexpr double kMetRad = 1e-3;
 // Number of times, from the landing to the end of the step, at which LandingErrorFrom checks the
@@ -25,9 +25,9 @@ constexpr int kChecks = 5;
 // height does not count as an error.
 constexpr double kLiftedM = 0.1;
 
-// The nearest footprint in reach is found iteratively. A step aimed too far lands short of its
-// target. A step aimed at that landing place may land elsewhere again, because the library blends a
-// different step. Convergence is faster if the target is moved by kOvershoot times the error.
+// A footprint in reach is found iteratively. A step aimed too far lands short of its target. A step
+// aimed at that landing place may land elsewhere again, because the library blends a different
+// step. Convergence is faster if the target is moved by kOvershoot times the error.
 constexpr int kMaxTries = 8;
 constexpr double kOvershoot = 1.5;
 
@@ -170,8 +170,8 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   return false;
 }
 
-// Searches for the footprint that the avatar can reach exactly and that is closest to the requested
-// one. Returns that footprint and its distance from the requested one.
+// Searches for a footprint close to the requested one that the avatar can reach exactly. Returns
+// that footprint and its distance from the requested one.
 FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
                                                 const FootprintError& missed, double start_phase,
                                                 PlanScratch& scratch) {

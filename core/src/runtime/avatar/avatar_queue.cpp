@@ -62,8 +62,8 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
     queue_head_ = 0;
   }
-  // The queue grows in small steps, and a long queue releases its memory after it has become empty.
-  // In a crowd, many queues tend to be long at the same time, but only briefly.
+  // The queue grows in small steps, and a queue that was long and has become empty releases its
+  // memory here. In a crowd, many queues tend to be long at the same time, but only briefly.
   if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
   if (queue_.size() == queue_.capacity()) {
     queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));

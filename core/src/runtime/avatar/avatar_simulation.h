@@ -57,8 +57,8 @@ struct AvatarChange {
 /// machine. Not thread-safe; one owner.
 ///
 /// After construction, only these calls allocate: Enqueue, because the queue may grow to kMaxQueue
-/// requests; calls that drop requests; SetLayer; the first Advance; and an Advance with more events
-/// than any before.
+/// requests; calls that drop requests; SetLayer; the first Advance; and an Advance with many
+/// events.
 class AvatarSimulation {
  public:
   static constexpr int kMaxQueue = Avatar::kMaxQueue;
@@ -170,11 +170,10 @@ class AvatarSimulation {
   /// pose without layers.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// True if the avatar moves or idles, has no layers, and the last Advance produced neither events
-  /// nor changes. In this case, time_s(), revision(), movement_time_s() and idle() are in one cache
-  /// line.
+  /// nor changes.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
-  /// Prefetches the cache line that contains the values listed at is_event_free(), for callers that
-  /// check many avatars.
+  /// Prefetches the cache line of is_event_free(), time_s(), revision() and movement_time_s(), for
+  /// callers that check many avatars.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
   /// The kStarted event of the current movement or requested stand. Null if the avatar stands
   /// without a request.

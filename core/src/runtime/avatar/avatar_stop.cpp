@@ -26,7 +26,7 @@ double EndLength(const MotionLibrary& library, const RequestPlan& plan) {
 }  // namespace
 
 // Plans a step that brings the feet together, or the first of two such steps. Returns nullopt if
-// the library has none, because any other step would only end with the feet apart again.
+// the library has none or the ground does not permit it.
 std::optional<RequestPlan> AvatarSimulation::PlanClosingStep() const {
   const MotionLibrary& library = *body_.library;
   const bool is_planted = body_.plants_feet;

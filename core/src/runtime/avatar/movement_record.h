@@ -13,7 +13,7 @@ namespace stridewire {
 /// - A change contains what the last Advance changed (AvatarChange). For a new movement it contains
 ///   only the decisions: group, weights, heading and footprints. The replica derives the rest, such
 ///   as the difference pose, from the previous movement.
-/// - A state contains everything, for replicas without a previous state. It is five to ten times as
+/// - A state contains everything, for replicas without a previous state. It is several times as
 ///   long.
 
 /// Appends a record of what the last Advance changed, or of the whole state if a change record

@@ -18,8 +18,8 @@ inline constexpr double kFeetApartForwardM = 0.12;
 struct LocomotionProfile {
   double step_m = 0.5;     ///< Comfortable length of a step forward, from foot to foot.
   double longest_m = 0.6;  ///< Maximum length of a step forward.
-  /// Length of the shortest forward step of a foot, for the foot whose shortest step is longer. At
-  /// most step_m. It is 0 if each foot can step beside the other.
+  /// Length of the shortest forward step that either foot can take, at most step_m. 0 if each foot
+  /// can step beside the other.
   double shortest_m = 0.0;
   double back_m = 0.0;    ///< Maximum comfortable length of a step backward.
   double width_m = 0.15;  ///< Sideways distance between the feet in a straight walk.

@@ -24,8 +24,8 @@ struct LandingTarget {
   const RequestPlan& request;
   /// Terrain. Null: level ground, whose height follows from the library and the request.
   const Terrain* terrain;
-  /// A point on the line along which the body moves. Steps of groups without a sideways parameter
-  /// are steered back to that line.
+  /// A point on the line along which the body moves. In groups without a sideways parameter, the
+  /// landing position is shifted by up to 5 cm towards that line.
   DVec3 line_m;
 };
 

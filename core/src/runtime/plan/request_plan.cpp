@@ -17,7 +17,7 @@ namespace {
 // Costs are in metres. They are distances between the requested parameters and those that a group
 // can produce, multiplied by a weight per parameter.
 
-// The positions of the feet determine the start, so it has a larger weight than the end.
+// The positions of the feet determine the start, so it has a large weight.
 constexpr double kStartWeight = 4.0;
 // Weight of a parameter that the request does not specify. It is small, so that the parameter
 // follows the others.
@@ -33,7 +33,7 @@ constexpr double kTieM = 1e-5;
 constexpr double kFootPreferenceM = 0.01;
 
 // Additional cost of a group with turn, side or height parameters for a request that specifies none
-// of them. In its steps, these parameters take arbitrary values, which would bend a straight walk.
+// of them. Straight walks therefore prefer groups of straight steps.
 constexpr double kStraightPreferenceM = 0.15;
 // Additional cost of a group whose steps were generated because the captures lack them. Captured
 // steps are preferred if they fit nearly as well.

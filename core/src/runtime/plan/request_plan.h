@@ -72,7 +72,7 @@ struct RequestPlan {
   bool clamped = false;
   /// Weighted distance between `applied` and `requested` in metres, plus the weighted errors of
   /// requested parameters that the group lacks. The weights depend on the parameter and the
-  /// request. For example, the start of a step has a larger weight than its end.
+  /// request.
   double distance_m = 0.0;
   /// `distance_m` plus costs for extrapolation, for the positions of the feet and, in libraries
   /// with generated groups, for captured groups without an example nearby.
@@ -90,9 +90,9 @@ inline constexpr double kHullGrowth = 0.1;
 inline constexpr double kMaxPlantedErrorM = 0.6;
 
 /// Plans a step in the group that covers it best, with parameters clamped to the hull of the group.
-/// The positions of the feet determine the start parameters, which have a larger weight than those
-/// of the end. If a group has no parameter for a requested turn, side or height, its steps count as
-/// steps without a turn, on level ground, or as wide as the stand pose.
+/// The positions of the feet determine the start parameters. If a group has no parameter for the
+/// turn, the height or the side, its steps count as straight, as level, or as wide as the stand
+/// pose.
 ///
 /// If the request does not specify a foot, the foot other than `last_moved` moves. If the avatar is
 /// `standing` and `last_moved` fits better, that foot moves. If `after` is set, only groups that

@@ -58,7 +58,7 @@ constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
 // length, so that avatars do not skip treads of stairs. This applies if the shorter step still
 // leads onto ground that is at least kLeastClimbM higher or lower than the standing foot.
 constexpr double kEasyClimbM = 0.18;
-// Replaces kEasyClimbM on slopes, where the y component of the ground normal is at most
+// Replaces kEasyClimbM on slopes, where the y component of the ground normal is below
 // kSlopeNormalY.
 constexpr double kEasySlopeClimbM = 0.15;
 constexpr float kSlopeNormalY = 0.985f;

@@ -95,9 +95,9 @@ class StepPlanner {
   // forward or backward. On a tread that is too short for the foot, moves it to where the tread
   // carries most of the sole.
   Footprint WithRoom(const Footprint& print);
-  // Returns `print`. If the step would climb or descend by more than kEasyClimbM, moves it back
-  // towards the standing foot: onto a tread in between or, if there is none and the step is long,
-  // onto the ground in front of the edge.
+  // Returns `print`. If the step would climb or descend too far (kEasyClimbM, kEasySlopeClimbM),
+  // moves it back towards the standing foot: onto a tread in between or, if there is none and the
+  // step is long, onto the ground in front of the edge.
   Footprint WithEasyClimb(const Footprint& print);
   // Returns true if the foot can stand at the footprint and reach it without a high swing.
   bool IsGood(const Footprint& print);

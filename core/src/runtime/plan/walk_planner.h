@@ -93,8 +93,7 @@ inline constexpr int kMaxWalkCandidates = 256;
 ///
 /// Every decision applies to one step only, so a changed terrain or goal takes effect with the next
 /// step. Never allocates. A call checks the ground at up to kMaxWalkCandidates footprints. On level
-/// ground, it calls PlanFootprint at most 160 times. Most steps of libraries with starts, stops and
-/// turns need one call.
+/// ground, it calls PlanFootprint at most 160 times.
 [[nodiscard]] WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                                         const WalkRequest& walk, const WalkStance& stance,
                                         WalkProgress& progress);

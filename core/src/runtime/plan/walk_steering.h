@@ -17,9 +17,9 @@ struct WalkStep {
   bool is_last = false;
 };
 
-/// Computes where the next steps of a walk should lead. It assumes level ground, and feet that can
-/// reach every place within fixed limits ahead, behind and to the side. StepPlanner then checks
-/// which of these steps the library and the ground permit.
+/// Computes where the next steps of a walk should lead, on level ground and within the step lengths
+/// of the LocomotionProfile. StepPlanner then checks which of these steps the library and the
+/// ground permit.
 ///
 /// The position of the body is derived from the staying foot, as if the other foot stood beside it.
 /// Each step moves the body by an equal part of the remaining distance. If the stand pose of the
@@ -32,10 +32,12 @@ class WalkSteering {
   /// Advances `next` past all waypoints that have been reached.
   void PassWaypoints(std::size_t& next) const;
 
-  /// Returns true if the body and both feet are at the goal within the tolerances.
+  /// Returns true if both feet are on their footprints at the goal, and the heading of the body is
+  /// that of the goal, within the tolerances.
   [[nodiscard]] bool HasArrived(double within_m, double within_rad) const;
-  /// Returns true if both feet are at the goal, or close to it after a step that led to it
-  /// (WalkStance::is_aimed): within 0.02 m and 0.5 rad, with the body within 0.25 rad.
+  /// Returns true if the heading of the body is within 0.25 rad of that of the goal, and both feet
+  /// are at the goal: within 1 mm and 0.002 rad or, after a step that was aimed at the goal
+  /// (WalkStance::is_aimed), within 0.02 m and 0.5 rad.
   [[nodiscard]] bool IsCloseToGoal() const;
   /// Returns the remaining effort of the walk in metres, as if the other foot stood beside `moved`.
   /// It is the distance to the goal through the waypoints plus the turns, where a radian counts as
@@ -45,8 +47,9 @@ class WalkSteering {
   /// the right foot. After a step, this is the distance by which the body moves in that step.
   [[nodiscard]] double BodiesApartM() const;
 
-  /// Returns the feet that may step next, the preferred foot first. During a walk, the feet
-  /// alternate. Otherwise, if the feet are apart along the path, the foot behind is preferred.
+  /// Returns the feet that may step next. If the feet are together, these are both feet, the
+  /// preferred one first. Otherwise, it is one foot: the one that is not at the goal yet, the rear
+  /// foot at the start of a walk, or the foot that did not move last.
   [[nodiscard]] std::span<const Foot> FeetToMove(std::size_t next_waypoint);
 
   /// Returns the next step of a foot. `part` scales its length, and `bend_rad` turns its direction

@@ -26,9 +26,9 @@ inline constexpr double kSoftGroundM = 0.006;
 // ground plane. The lift fades to zero at kFarFromPrintM.
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
-// If planting lifts a sole out of the ground, the root rises as well, but by less than this. In the
-// blend, the toes of a foot that pushes off may sink by almost 3 cm. If the body followed their
-// lift, it would rise and fall within 0.1 s. The knee of that leg bends more instead.
+// If planting lifts a sole out of the ground, the root rises as well, but by less than this. If it
+// rose as far as the toes of a foot that pushes off, the body would rise and fall abruptly. The
+// knee of that leg bends more instead.
 inline constexpr double kRootFollowsLiftM = 0.01;
 // During a swing, the ground plane that limits the foot changes from that of the old footprint to
 // that of the new one. The change begins at kGroundBlendStart and takes kGroundBlendLength, as
@@ -71,8 +71,7 @@ inline constexpr double kReversedRad = 2.0;
 // If an ankle would be flexed (toes up) by more than kAnkleLimitRad beyond a right angle between
 // shank and level sole, the foot turns about its ball, heel up. The turn grows with the excess: it
 // begins gently over kAnkleSoftRad and then is kHeelRise times the excess. The factor is larger
-// than 1, because a heel that rises also bends the knee, which flexes the ankle by a quarter to two
-// thirds of the turn.
+// than 1, because a heel that rises also bends the knee, which flexes the ankle further.
 inline constexpr double kAnkleLimitRad = 0.7;
 inline constexpr double kAnkleSoftRad = 0.1;
 inline constexpr double kHeelRise = 1.6;
