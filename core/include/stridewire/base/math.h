@@ -23,7 +23,7 @@ inline constexpr Quat kIdentityQuat = Quat(1.0f, 0.0f, 0.0f, 0.0f);
 [[nodiscard]] Quat YawRotation(double yaw_rad);
 
 /// Computes the heading of a rotation: atan2(z'_x, z'_z) with z' = q z q^-1 (paper, Section 5). If
-/// z' is within 1e-3 of vertical, returns false and leaves `heading_rad` unchanged.
+/// z' is within 1e-3 rad of vertical, returns false and leaves `heading_rad` unchanged.
 bool HeadingOf(const Quat& rotation, double& heading_rad);
 
 /// Returns v rotated by `yaw_rad` about +Y.

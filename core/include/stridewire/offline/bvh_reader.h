@@ -83,13 +83,13 @@ struct BvhReadOptions {
 ///   may change its offset. Parts of the body that branch off too high for that are attached to the
 ///   root. Branches that are no part of the body, such as cameras, are left out if they begin above
 ///   the root.
-/// - Position channels of the root replace its OFFSET. For other joints, the mean of the position
-///   channels becomes the offset, and a note states the largest deviation from it. If a joint of
-///   the legs, the trunk or the arms is ever more than 2 cm from its mean position, the file is
-///   rejected. If all positions of such a joint are zero, its OFFSET is kept.
+/// - Position channels of the root replace its OFFSET. For any other joint, the mean of the
+///   position channels becomes the offset, unless all of them are zero. A note states the largest
+///   deviation from the mean. If a joint of the legs, the trunk or the arms is ever more than 2 cm
+///   from its mean position, the file is rejected.
 /// - If `Frame Time` agrees with a whole number of frames per second within the precision of its
 ///   digits, the reader uses that number.
-/// - The reader detects legs by joint names that end in the side and the part of the leg. If that
+/// - The reader detects legs by joint names that contain the side and the part of the leg. If that
 ///   fails, it looks for two chains of equal length that start at the same joint and end below the
 ///   rest of the body. It takes the pair nearest to the root; of several such pairs, the longest. A
 ///   joint that never bends the leg, such as a twist joint, is part of the thigh or the shin and

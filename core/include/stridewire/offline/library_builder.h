@@ -83,8 +83,8 @@ struct LibraryBuilder {
   /// and bends toes upward where they are below the ground.
   [[nodiscard]] static LibraryBuilder Selecting();
 
-  /// Approximate number of grid cells per second of mean duration. Intervals in which an example
-  /// would be stored with a mean error above 0.45 degrees have more cells.
+  /// Approximate number of grid cells per second of mean duration. A group has more cells if an
+  /// example would otherwise be stored with a mean error above 0.45 degrees.
   double grid_fps = 30.0;
   /// Examples are averaged if their parameters are within this distance of each other, in metres; a
   /// radian counts as 0.5 m. They are grouped by complete-linkage clustering. With 0, only

@@ -12,17 +12,15 @@ namespace stridewire {
 [[nodiscard]] std::vector<int> CellsAtRate(const std::vector<std::vector<double>>& keytimes_s,
                                            double fps);
 
-// Maximum of the error of a stored example, which is a mean over joints and time: 0.45 degrees, in
-// radians.
+// Maximum error of a stored example, averaged over joints and time: 0.45 degrees.
 inline constexpr double kStoredErrorRad = 0.45 / 57.29577951308232;
 
 // Chooses the number of grid cells per keytime interval for a group of valid examples. Starts with
 // the result of CellsAtRate for `fps`, and adds cells until no example is stored with an error
 // above kStoredErrorRad. More cells are needed for slow examples in a group of fast ones, and for
-// captures with fast rotations: with 30 cells per second, steps of CMU subject 01 have a mean error
-// of 0.6 degrees and up to 1.2. In each interval, the number is limited by the frames of the
-// longest example and by the size of the grid. Generated steps are not measured, since they are
-// smooth. `stand_root`: see ResampleOnGrid.
+// captures with fast rotations. In each interval, the number is limited by the frames of the
+// longest example and by the size of the grid. Generated steps (RawGroup::is_completed) get no
+// additional cells, since they are smooth. `stand_root`: see ResampleOnGrid.
 [[nodiscard]] std::vector<int> ChooseCells(const RawGroup& group, double fps,
                                            const GridLayout& layout, const Quat& stand_root);
 

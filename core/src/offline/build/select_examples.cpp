@@ -14,12 +14,12 @@
 namespace stridewire {
 namespace {
 
-// At most one outlier is dropped per this number of examples, rounded down. Groups of fewer
-// examples are therefore not tested.
-constexpr std::size_t kExamplesPerOutlier = 10;
 // No outlier is dropped if fewer examples than this are left. With kExamplesPerOutlier = 10, this
 // limit never decides.
 constexpr std::size_t kOutlierExamplesMin = 8;
+// At most one outlier is dropped per this number of examples, rounded down. Groups of fewer
+// examples are therefore not tested.
+constexpr std::size_t kExamplesPerOutlier = 10;
 // Points outside the hull by at most this distance count as inside.
 constexpr double kInsideM = 1e-3;
 // Ratio of the standard deviation to the median absolute deviation (MAD).

@@ -38,7 +38,8 @@ inline constexpr int kExamplesPerCoefficient = 4;
 // but the weights of the others are 0.
 struct SmoothGroup {
   std::vector<double> sites, dilations, linear, radial;
-  // A copy of the group, whose sites are the examples used. Some of its spans refer to the vectors.
+  // A copy of the group whose sites are the examples used. Its sites, dilations, linear and radial
+  // refer to the vectors above. Its other spans refer to the data of the original group.
   MotionGroup group;
 };
 

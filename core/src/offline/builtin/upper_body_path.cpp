@@ -19,7 +19,7 @@ constexpr double kThoraxYawRad = 4.0 * kDegree;
 constexpr double kThoraxRollRad = 2.0 * kDegree;
 constexpr double kLeanRangeRad = 1.6 * kDegree;
 constexpr double kNodRad = 1.5 * kDegree;
-// The following delays are fractions of a step.
+// Values of Oscillation::lag for the swings of arm and elbow.
 constexpr double kArmLag = 0.05;
 constexpr double kElbowLag = 0.17;
 
@@ -98,8 +98,8 @@ Oscillation Lean(const GaitState& state) {
   return {(4.0 + 3.0 * state.speed_mps + uphill) * kDegree, kLeanRangeRad * state.vigour};
 }
 
-// A body with the acceleration a must lean by atan(a / g) to stay in balance. Trunk and legs share
-// this lean.
+// Returns the lean of the trunk due to acceleration. A body with the acceleration a must lean by
+// atan(a / g) to stay in balance. Trunk and legs share this lean.
 double AccelerationLean(const StepTiming& timing) {
   constexpr double kRad_mps2 = 2.5 * kDegree;
   const double acceleration = (timing.end.speed_mps - timing.start.speed_mps) / timing.end_s;

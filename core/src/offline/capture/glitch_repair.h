@@ -35,7 +35,7 @@ struct GlitchReport {
 ///   less than 15 cm beyond the joint. Fingers, thumbs and toes flip by up to 180 degrees.
 /// - Other jumps remain and are reported.
 /// - The root is interpolated where it deviates too far from the median over five frames. The limit
-///   is 1 cm or, if larger, the distance that 40 m/s^2 covers in one frame.
+///   is 1 cm or, if larger, 40 m/s^2 times the square of the time between frames.
 GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& clip);
 
 /// Returns a description such as "LeftArm turns 94 degrees in one frame at 0.02 s".

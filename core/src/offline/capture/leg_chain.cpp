@@ -19,8 +19,8 @@ constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 constexpr double kBendShare = 0.3;
 constexpr double kLeastBendRad = 2.0 * kRadPerDegree;
 constexpr double kMostBendRad = 10.0 * kRadPerDegree;
-// A segment longer than this fraction of the chain contains both thigh and shin of a leg that stays
-// straight.
+// A segment longer than this fraction of the chain is assumed to contain both thigh and shin of a
+// leg that stays straight.
 constexpr double kLongestSegmentShare = 0.6;
 
 LegPart PartOf(const FigureShape& figure, int j) {

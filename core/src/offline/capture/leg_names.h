@@ -12,7 +12,7 @@ struct LegName {
   LegPart part = LegPart::kNone;
 };
 
-/// Derives side and part of the leg from the end of a joint name. Prefixes are ignored:
+/// Derives side and part of the leg from a joint name. Prefixes are ignored:
 /// "LeftUpLeg", "mixamorig_LeftUpLeg", "J_Bip_L_Foot", "Bip01 L Thigh", "calf_l", "KneeRight",
 /// "lfemur". "LeftHip" is the upper end of the thigh. Names of helper joints (twist, roll, IK) and
 /// of tips have no part. A name without a side has no part either.

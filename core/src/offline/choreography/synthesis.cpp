@@ -93,7 +93,7 @@ void MeasurePlants(const MotionLibrary& library, const Clip& clip, MovementRecor
   }
 }
 
-// Returns true for the event that ends a walk: its final standing movement, or a rejection.
+// Returns true for the event that ends a walk: kFinished of kind kStand, or kRejected.
 bool EndsWalk(const AvatarEvent& event, const std::set<std::uint64_t>& walks) {
   return walks.contains(event.request_id) &&
          (event.type == AvatarEventType::kRejected ||
@@ -136,7 +136,7 @@ Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size
   return {};
 }
 
-// Measures the distance between a step's requested footprint and the foot when it first stands.
+// Measures how far the foot is from the requested footprint of a step when it has just landed.
 void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& requested,
                     MovementRecord& record) {
   STRIDEWIRE_CHECK(IsStep(record.kind) && !record.plants.empty());

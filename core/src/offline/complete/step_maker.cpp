@@ -99,9 +99,9 @@ struct HermiteCurve {
   }
 };
 
-// Generates one step. First, it searches for the detour and the lift of the swinging foot and for
-// the lowering of the root. For these it evaluates only feet, hips and root. Then it generates the
-// frames.
+// Generates one step. First, it searches for the sideways detour of the swinging foot around the
+// other foot, for its lift, and for the lowering of the root. For these it evaluates only feet,
+// hips and root. Then it generates the frames.
 class StepGenerator {
  public:
   StepGenerator(const Person& person, Foot moving, const StepFeet& feet)
@@ -504,7 +504,7 @@ class StepGenerator {
     return missing;
   }
 
-  // Returns the largest distance from hip to ankle.
+  // Returns the maximum distance from hip to ankle that a leg may have (kMaxExtension).
   [[nodiscard]] double ReachOf(Foot foot) const {
     LegPose leg;
     EvaluateLeg(person_.skeleton, person_.rig, ToPose(person_.stand), foot, leg);

@@ -7,8 +7,7 @@
 namespace stridewire {
 
 /// Thresholds for ground contacts. They suit recordings of adults and were tuned on twelve
-/// captured walks. A maximum speed of 0.35 instead of 0.8 m/s, for example, would miss half of the
-/// steps.
+/// captured walks.
 struct ContactOptions {
   double speed_max_m_s = 0.8;  ///< Maximum speed of a standing point.
   /// Maximum height of a standing point above its resting height during that contact.

@@ -16,7 +16,7 @@ namespace stridewire {
 struct ExtractOptions {
   ContactOptions contacts;
   SegmentOptions segments;
-  // A step is straight if it is within the following four limits.
+  // A step is straight if it leads forward and is within the following four limits.
   /// Limit on the change of the heading (StrideHeading); 4 degrees.
   double straight_turn_max_rad = 0.0698;
   /// Limit on the angle between the motion of the feet and the heading; 15 degrees. Steps with a
@@ -99,7 +99,8 @@ struct Extraction {
     double unrest = 0.0;
     double tilt_m = 0.0;  ///< See RawLibrary::stand_tilt_m.
   };
-  std::optional<Stand> stand;  ///< The stillest moment with both feet on the same ground.
+  /// The moment closest to standing still and upright, with both feet at the same height.
+  std::optional<Stand> stand;
 };
 
 inline constexpr ParameterName kGeneralStepParameters[] = {

@@ -12,7 +12,7 @@ namespace stridewire {
 /// Joints are paired by names. A side is Left or Right anywhere in the name, or a single L or R, l
 /// or r, at the start of the name or as a word of its own. If the names do not pair all joints,
 /// joints are paired by shape. In this case the legs are partners. Other joints are partners if
-/// their bones, including all bones below, have equal lengths (within 8 % and 1 cm) and point in
+/// their bones, including all bones below, have equal lengths (within 8 % plus 1 cm) and point in
 /// mirrored directions (within 60 degrees). Directions are those of the pose `reference`, which
 /// must face +Z.
 ///

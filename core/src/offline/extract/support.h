@@ -8,7 +8,8 @@ namespace stridewire {
 /// contact remains if the pelvis is above the foot, the figure is not in free fall, and one of
 /// these conditions holds:
 ///
-/// - The other foot is higher for a while, so this foot carries the figure alone.
+/// - The other foot does not stand for a while, and is not more than 3 cm below this foot, so this
+///   foot carries the figure alone.
 /// - The foot is as low as the other foot, which stands as well, for a while.
 /// - Seen from above, the pelvis is so close to this foot that the foot must carry a part of the
 ///   weight.

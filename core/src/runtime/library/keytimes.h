@@ -33,8 +33,7 @@ inline constexpr double kLongestInterval = 4.0 / 3.0;
 /// Blends keytimes (paper, Eq. (4)). Blends the *lengths* of intervals and clamps each length to
 /// kShortestInterval and kLongestInterval, because weights may be negative. Without the clamp, the
 /// keytimes sum w K would not always increase outside the hull. Even inside the hull, an interval
-/// could shrink much more than the motion in it, which would then be too fast: by 2.7 cm per 60 Hz
-/// frame for steps of 0.64 to 0.76 m of CMU subject 16.
+/// could shrink much more than the motion in it, which would then be too fast.
 ///
 /// `example_keytimes_s` is [example][interval_count + 1] and `out_s` is [interval_count + 1]. The
 /// weights must sum to 1, and K_0 = 0.

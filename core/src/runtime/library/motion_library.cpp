@@ -48,9 +48,8 @@ constexpr double kMaxRadiusFactor = 100.0;
 // The weights must stay bounded up to this distance outside the range of each parameter, as a
 // fraction of the range. Requests are clamped to the hull enlarged by 10 %, so there is a margin.
 constexpr double kReach = 0.5;
-// Limit on the sum of |w|. It is compared with an upper bound that increases with the number of
-// examples. For 70 captured steps with five parameters, the bound is 230, while the real sum stays
-// below 3.
+// Limit on the sum of |w|. It is compared with an upper bound, which increases with the number of
+// examples and is far above the real sum.
 constexpr double kMaxWeightSum = 1e6;
 // Tolerance for sums of weights that must be 1.
 constexpr double kSumTolerance = 1e-7;

@@ -33,8 +33,8 @@ struct PoseQuantization {
   double largest_error_m = 0.0;
 };
 
-/// Chooses the minimum number of bits with which every joint and end site is within
-/// `largest_error_m` of its position relative to the root.
+/// Chooses few bits (greedily) with which every joint and end site is within `largest_error_m` of
+/// its position relative to the root.
 ///
 /// The encoder must process joints from the root on, and each joint must compensate for the errors
 /// of those above it. The angular error of a joint then moves only its own bone, and the total

@@ -18,7 +18,7 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586;
 constexpr double kRadPerDegree = kTwoPi / 360.0;
 
-// Time in which an avatar reaches its stand pose. Games expect a stop within 0.3 s.
+// Time in which an avatar reaches its stand pose.
 constexpr double kSettleEaseS = 0.3;
 constexpr double kSettleS = 0.5;  // Duration of the group `settle`.
 // The idle motion fades in slowly, because it may begin in the middle of a weight shift.

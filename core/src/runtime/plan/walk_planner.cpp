@@ -68,7 +68,8 @@ constexpr std::array<double, 5> kComfortableTurnsRad{0.0, 0.3, -0.3, 0.6, -0.6};
 // Turns of steps in place.
 constexpr std::array<double, 2> kPivotTurnsRad{0.8, -0.8};
 
-// Within this distance of the goal, the ground there is checked again, because it may have changed.
+// If the remaining effort is below this, the ground at the goal is checked again, because it may
+// have changed.
 constexpr double kGoalInSightM = 1.5;
 
 // A walk makes progress if its remaining effort decreases by at least this.

@@ -179,8 +179,9 @@ struct RootResidualOf {
   Number approach_over_s;
 };
 
-// Adds the remaining part of the root's residual to its shift. The vertical part takes longer than
-// the horizontal part, because a body rises for as long as its leg extends.
+// Adds the remaining parts of the root's residual and of its approach to its shift. The vertical
+// residual fades out over a fraction of the movement (kRootRisePart), because a body rises for as
+// long as its leg extends.
 template <typename Number, typename Vector, typename Timing>
 STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timing,
                                          const RootResidualOf<Number, Vector>& residual) {

@@ -122,7 +122,7 @@ HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[1], std::size_t{1});
 }
 
-// Maps positions in a leg's chain to joints in an array of rotations. The array contains either all
+// Maps indices in a leg's chain to indices in an array of rotations. The array contains either all
 // joints of the skeleton, or only those in LegRig::joints.
 using JointMap = std::size_t (LegRig::Bones::*)[kMaxLegChain];
 

@@ -39,8 +39,7 @@ class SolePoints {
   [[nodiscard]] static constexpr int size() { return kRows * kColumns; }
 
   // Marks the points that are connected to the ball by slopes of at most kMaxSlope. Passes over all
-  // points until nothing changes. Without edges, this takes nine passes, because marks spread
-  // towards the heel by about one row per pass.
+  // points until nothing changes.
   void Spread() {
     ball().is_reached = true;
     for (bool is_changed = true; is_changed;) {

@@ -49,7 +49,7 @@ struct Report {
 
 // Measures and refines a library and draws the figures of the paper for it. Errors: kOutOfRange if
 // no group has a parameter named in `axes`; kUnsupported if gnuplot is not installed or `progress`
-// returned false.
+// returned false; kIo if gnuplot fails.
 [[nodiscard]] Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
                                           const ReportOptions& options);
 
