@@ -97,7 +97,7 @@ enum class Interrupt : std::uint8_t {
   ///
   /// While more than 40 % of a swing remains, a requested step of the swinging foot redirects this
   /// foot to the new footprint. If feet are planted, a walk that begins with a step of this foot
-  /// redirects it as well. A stand or jump then shortens a step that would end with the feet apart.
+  /// also redirects it, and a stand or jump shortens a step that would end with the feet apart.
   kNow,
 };
 

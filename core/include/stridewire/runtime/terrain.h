@@ -23,7 +23,7 @@ inline constexpr double kMaxTerrainCellM = 1e3;
 inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Maximum magnitude of each coordinate.
 /// Maximum number of boxes that intersect one cell of the terrain's spatial index. The limit bounds
 /// the time of a query. A terrain exceeds it if more boxes overlap in one place, or if many small
-/// boxes are close together in a very large terrain, because the index has at most 1024 x 1024
+/// boxes are close together and others are far away, because the index has at most 1024 x 1024
 /// cells.
 inline constexpr std::size_t kMaxTerrainBoxesPerCell = 256;
 

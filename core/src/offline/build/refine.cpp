@@ -352,10 +352,10 @@ class GroupRefiner {
     return nullptr;
   }
 
-  // The amended rule: adds a pseudoexample at the largest peak of the error where this is within
-  // the limits and decreases the largest error. If the pass accepts increases, the error need not
-  // decrease. Chooses the radius that minimizes the largest error. Returns null if there is no such
-  // peak.
+  // The amended rule: adds a pseudoexample at the largest peak of the error at which the group
+  // stays within the limits and its largest error decreases. If the pass accepts increases, the
+  // error need not decrease. Chooses the radius that minimizes the largest error. Returns null if
+  // there is no such peak.
   std::shared_ptr<const Candidate> AddBest(const Pass& pass, const Candidate& current,
                                            HullSurvey& survey, GroupRefinement& report) {
     const std::vector<ParameterValues> hot = HotPoints(survey);

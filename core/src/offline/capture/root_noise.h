@@ -7,8 +7,7 @@ namespace stridewire {
 
 /// Removes noise from the root in place (decision 0059). The rotation and position of the pelvis
 /// follow from a few markers on the waist. If these markers slip, the pelvis shakes from frame to
-/// frame. The feet stand still nevertheless, because the hips compensate for the shaking. In an
-/// avatar, the pelvis would shake visibly, especially where steps are played faster.
+/// frame. The feet stand still nevertheless, because the hips compensate for the shaking.
 ///
 /// The root is filtered if its angular acceleration exceeds 600 rad/s^2, or its acceleration 90
 /// m/s^2, in more than 10 % of the frames. A Gaussian filter halves the amplitude at 12 Hz.

@@ -197,8 +197,8 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
 
 // Computes where the planned step places its foot, and how far that is from the requested
 // footprint. The errors of the plan are not sufficient: only the planted pose shows that a leg is
-// too short for a step up or down. If planting displaces the standing foot instead of the moving
-// foot, the displacement of the standing foot counts as the error.
+// too short for a step up or down. Planting may displace the standing foot instead of the moving
+// foot, so the displacement of one foot relative to the other counts if it is larger.
 FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();

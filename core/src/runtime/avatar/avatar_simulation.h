@@ -172,8 +172,8 @@ class AvatarSimulation {
   /// True if the avatar moves or idles, has no layers, and the last Advance produced neither events
   /// nor changes.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
-  /// Prefetches the cache line of is_event_free(), time_s(), revision() and movement_time_s(), for
-  /// callers that check many avatars.
+  /// Prefetches the cache line that is_event_free(), time_s(), revision() and movement_time_s()
+  /// read, for callers that check many avatars.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
   /// The kStarted event of the current movement or requested stand. Null if the avatar stands
   /// without a request.

@@ -25,8 +25,8 @@ struct ContactKeytimes {
 /// Returns the height of the ground at the landing foot relative to the ground at the other foot,
 /// in metres, for a step whose height parameter is `height_m`. Parameters are measured at the balls
 /// of the feet. On level ground, the heights of the balls differ by some centimetres, because feet
-/// roll. Differences of up to 5 cm therefore count as level. Otherwise, a hundred level steps would
-/// climb half a metre.
+/// roll. Differences of up to 5 cm therefore count as level. Otherwise, they would add up over a
+/// walk.
 [[nodiscard]] inline double GroundRise(double height_m) {
   constexpr double kLevelM = 0.05;
   return std::fabs(height_m) > kLevelM ? height_m : 0.0;

@@ -41,7 +41,7 @@ constexpr double kMostlySettled = 0.7;
 // foot closer than kMinPassingWidthM is pushed outward by up to kMaxPushM. This is checked while
 // the feet are within kPassingLengthM of each other in the walking direction. If a step starts or
 // lands closer than kCrossingWidthM, the legs cross intentionally. If a request does not specify
-// the sideways distance, the foot lands at least kMinLandingWidthM from the other foot.
+// the sideways distance, the foot lands at least kMinLandingWidthM to the side of the other foot.
 constexpr double kMinPassingWidthM = 0.11;
 constexpr double kMinLandingWidthM = 0.05;
 constexpr double kPassingLengthM = 0.2;

@@ -80,7 +80,7 @@ struct RequestPlan {
 };
 
 /// Requests may be outside the hull of the examples by this fraction of its size. The fraction is
-/// small, because extrapolation by 0.2 m causes errors of 80 mm.
+/// small, because extrapolated movements are inaccurate.
 inline constexpr double kHullGrowth = 0.1;
 
 /// Maximum distance between the end of a library's step and its footprint that planting may

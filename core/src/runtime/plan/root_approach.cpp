@@ -112,8 +112,8 @@ void PlanRootApproach(const FootPlanJob& job) {
   const double most_s = std::min(longest_s, movement.duration_s() - start_s);
   DVec3 residual_m = plan.root_residual_m;
   DVec3 residual_m_s = plan.root_residual_m_s;
-  // The vertical component of the residual fades out more slowly, over the fraction kRootRisePart
-  // of the movement, so it is ignored here.
+  // The vertical component of the residual fades out over the fraction kRootRisePart of the
+  // movement, so it is ignored here.
   residual_m.y = residual_m_s.y = 0.0;
   plan.root_approach = {.offset_m = offset_m,
                         .offset_m_s = offset_m_s,

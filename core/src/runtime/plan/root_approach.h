@@ -4,8 +4,8 @@
 
 namespace stridewire {
 
-/// Sets FootPlan::root_approach of a planned movement. It limits the acceleration of the pelvis
-/// while the difference pose and the residual of the root fade out, if they have enough time. Does
+/// Sets FootPlan::root_approach of a planned movement. Its duration is chosen so that the blend
+/// from the previous pose does not accelerate the pelvis too much, up to a maximum duration. Does
 /// nothing for stands. Call it after setting the residuals of the plan.
 void PlanRootApproach(const FootPlanJob& job);
 

@@ -59,12 +59,14 @@ constexpr double kStrideS = 0.62;
 // saves at least this time.
 constexpr double kStrideMarginS = 0.3;
 
-// If the angle between an avatar's heading and its path exceeds this, the avatar first turns on the
-// spot.
+// If the angle between an avatar's heading and its path exceeds this, a step turns by up to
+// kSpotTurn. Steps become shorter with the angle that remains after the turn. From this angle on,
+// the avatar turns on the spot.
 constexpr double kSlowTurnRad = 0.7;
-// The walk approaches the goal in a curve that ends in the heading at the goal. The length of the
-// curve is this fraction of the remaining distance, at most kCurveM. The curve fades out for
-// headings that would require a loop, between kMaxCurveRad - kCurveFadeRad and kMaxCurveRad.
+// The walk aims at a point behind the goal, so that it approaches the goal in a curve that ends in
+// the heading at the goal. The distance of that point from the goal is this fraction of the
+// remaining distance, at most kCurveM. It decreases to 0 for headings that would require a loop,
+// between kMaxCurveRad - kCurveFadeRad and kMaxCurveRad.
 constexpr double kCurvePart = 0.2;
 constexpr double kCurveM = 0.6;
 constexpr double kMaxCurveRad = 1.9;
