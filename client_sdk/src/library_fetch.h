@@ -24,9 +24,8 @@ struct LibraryTask {
 };
 
 /// Runs a task and returns the library. Fails with kNotFound if the folder has no intact file of
-/// that hash, and with kMalformed if `file` is not a library with that hash. If a file cannot be
-/// stored, that is not an error. Files are named HASH.swl. They are written under a temporary name
-/// and renamed when they are complete.
+/// that hash, with the errors of MotionLibrary::FromBytes if `file` is not a library, and with
+/// kMalformed if its hash differs. Ignores errors of storing the file. Files are named HASH.swl.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> RunLibraryTask(
     const LibraryTask& task);
 

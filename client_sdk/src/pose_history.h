@@ -45,8 +45,8 @@ void InterpolatePose(const PoseKeys& keys, double time_s, Vec3& root_position_m,
 ///
 /// The displayed motion is continuous, no matter when poses arrive:
 /// - A curve through the poses is not changed after its display has begun. The slope at a pose is
-///   the secant through both neighbours. If an interval is displayed before the pose after it has
-///   arrived, the slope at its end remains that of the interval itself.
+///   that of the secant through both neighbours. If an interval is displayed before the next pose
+///   has arrived, the slope at its end remains that of the interval's own secant.
 /// - After the newest pose, and after the last pose before a gap, the motion continues and slows
 ///   down until it stops, within kMaxExtrapolationS.
 /// - If a pose arrives after its time was displayed, its difference from the displayed pose fades
@@ -136,10 +136,10 @@ class PoseHistory {
   };
 
   /// Computes the pose at `time_s`: evaluates the movement if one determines the pose, otherwise
-  /// interpolates between stored poses (InterpolatePose). In the interval before a discontinuity,
-  /// returns the pose at its start, but extrapolates it if the interval is a gap, more than 1.5
-  /// times as long as the one before. Also extrapolates after the newest pose. Returns nullopt for
-  /// times before the oldest pose.
+  /// interpolates between poses (InterpolatePose). After the newest pose, extrapolates. In the
+  /// interval before a discontinuity, returns the pose at the interval's start, or extrapolates if
+  /// the interval is more than 1.5 times as long as the one before. Returns nullopt for times before
+  /// the oldest pose.
   [[nodiscard]] std::optional<Sampled> Sample(double time_s, Vec3& root_position_m,
                                               std::span<Quat> rotations) const;
 

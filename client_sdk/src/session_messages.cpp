@@ -246,8 +246,8 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
              world != nullptr && observe != nullptr) {
     OnObserveReply(*world, *observe, message);
   }
-  // If only some items failed, the reply as a whole is OK. The first failed item is reported
-  // instead.
+  // Failed items do not change the status of the reply. If it is OK, the client reports the status
+  // of the first failed item instead.
   std::string text = message.text;
   for (const protocol::ReplyItem& item : message.items) {
     if (status != STRIDEWIRE_OK) break;

@@ -46,7 +46,8 @@ class WorldView : public PoseSink {
  public:
   /// Poses of an avatar that is gone can be sampled for this time, in seconds of server time.
   static constexpr double kKeepGoneS = 2.0;
-  /// If an avatar has left the region, the view ignores its older poses for this many ticks.
+  /// If an avatar has left the region, the view ignores its older poses for at least this many
+  /// ticks.
   static constexpr std::uint64_t kKeepLeftTicks = 600;
   /// Maximum number of pairs of a shard and a mode. A batch of any further pair is an error.
   static constexpr std::size_t kMaxShards = 1024;
@@ -116,7 +117,7 @@ class WorldView : public PoseSink {
 
   /// Marks an avatar as gone.
   void Remove(protocol::AvatarId avatar);
-  /// Marks an avatar as gone because it left the observed region at `tick`. Batches of earlier
+  /// Marks an avatar as gone because it left the observed region at `tick`. Its poses of earlier
   /// ticks that arrive later are ignored.
   void Leave(protocol::AvatarId avatar, std::uint64_t tick);
 
@@ -237,7 +238,8 @@ class WorldView : public PoseSink {
   /// Returns the index of the avatar's track, or tracks_.size() if it is not among the next few
   /// tracks from `index` on.
   [[nodiscard]] std::size_t FindTrackAfter(std::size_t index, protocol::AvatarId avatar) const;
-  /// Calls `push(stamp)` to add a pose to the history.
+  /// Sets the segment of `stamp`, calls `push(stamp)` to add a pose to the history, and updates the
+  /// track and `counts`.
   template <typename PushPose>
   void Push(Track& track, const Lane& lane, PoseStamp stamp, Counts& counts, const PushPose& push);
   /// Returns true if an avatar has a movement and no layers.

@@ -40,8 +40,8 @@ class PoseSink {
   /// because a message is missing.
   virtual void OnGone(protocol::AvatarId avatar) = 0;
 
-  /// The set evaluates only avatars for which this function returns true. If the result changes to
-  /// true, the avatar appears when the server sends its next state.
+  /// Called when the state of an unknown avatar arrives. If it returns false, the set ignores the
+  /// avatar until its next state.
   [[nodiscard]] virtual bool Wants(protocol::AvatarId) const { return true; }
 
   /// True: the sink evaluates movements without layers itself. In OnPose, it must not read

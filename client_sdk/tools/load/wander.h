@@ -17,7 +17,7 @@ class SmallRandom {
   [[nodiscard]] std::uint64_t Next();
   /// Returns a number with uniform distribution in [min, max).
   [[nodiscard]] double Uniform(double min, double max);
-  /// Returns an integer with uniform distribution in [min, max], both included.
+  /// Returns an integer with uniform distribution in [min, max].
   [[nodiscard]] int Integer(int min, int max);
 
  private:

@@ -85,10 +85,9 @@ namespace Stridewire
         /// <summary>The movement begins after all queued movements.</summary>
         Queued = 0,
         /// <summary>The movement begins after the current step or jump. A current stand ends at
-        /// once, and a walk ends after its current step. The queue is dropped.</summary>
+        /// once, and a walk ends after its current step.</summary>
         AfterMovement = 1,
-        /// <summary>The movement begins as soon as the feet allow it. The queue is
-        /// dropped.</summary>
+        /// <summary>The movement begins as soon as the feet allow it.</summary>
         Now = 2,
     }
 
@@ -97,8 +96,8 @@ namespace Stridewire
     {
         /// <summary>The server sends float32 values, without loss.</summary>
         Full = 0,
-        /// <summary>The server sends compressed poses. The error of each joint and end site is at
-        /// most 1 mm.</summary>
+        /// <summary>The server sends compressed poses. With STRIDEWIRE_DETAIL_ALL, the error of
+        /// each joint and end site is at most 1 mm.</summary>
         Quantised = 1,
         /// <summary>The server sends movements, about 150 bytes per step, and the client evaluates
         /// the poses. They equal those of STRIDEWIRE_FULL bit for bit. The client fetches the
@@ -151,8 +150,8 @@ namespace Stridewire
         /// <summary>Uses world. The skeleton is available. Repeated after SESSION_LOST.</summary>
         WorldJoined = 5,
         /// <summary>Uses world, command, status, accepted, text. The status is OK only if the
-        /// server has executed all items. Otherwise it is the status of the first refused item.
-        /// `accepted` is the number of executed items.</summary>
+        /// server has executed all items. If the server has refused only items, it is the status of
+        /// the first refused item.</summary>
         Reply = 6,
         /// <summary>Uses world, command, item_index, avatar, request_id, status, text. Reports an
         /// item that the server refused, or the id that it chose for a spawned avatar. Precedes the

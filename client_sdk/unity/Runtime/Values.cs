@@ -123,8 +123,7 @@ namespace Stridewire
         public ulong Tick;
         /// <summary>Server time of this pose in seconds.</summary>
         public double TimeS;
-        /// <summary>PoseKind.Held and Extrapolated: seconds since the last received pose.
-        /// </summary>
+        /// <summary>PoseKind.Held and Extrapolated: seconds since the pose of Tick.</summary>
         public double HeldS;
         /// <summary>World position of joint 0.</summary>
         public Position RootPosition;

@@ -111,8 +111,9 @@ typedef struct stridewire_client_options {
 void stridewire_client_options_init(stridewire_client_options* options, size_t struct_bytes);
 
 /// Creates a client and starts its network thread. The client does not connect yet. `options` may
-/// be NULL for the defaults. Fails with OUT_OF_RANGE if an option is out of range, with
-/// VERSION_MISMATCH if header and library differ, and with INVALID_ARGUMENT or OUT_OF_MEMORY.
+/// be NULL for the defaults. Fails with OUT_OF_RANGE if a number is out of range, with
+/// INVALID_ARGUMENT if `client` is NULL or a text is invalid, with VERSION_MISMATCH if header and
+/// library differ, and with OUT_OF_MEMORY.
 stridewire_status stridewire_client_create(const stridewire_client_options* options,
                                            stridewire_client** client);
 
@@ -280,8 +281,7 @@ typedef enum stridewire_event_type {
   /// Uses world. The skeleton is available. Repeated after SESSION_LOST.
   STRIDEWIRE_EVENT_WORLD_JOINED = 5,
   /// Uses world, command, status, accepted, text. The status is OK only if the server has executed
-  /// all items. Otherwise it is the status of the first refused item. `accepted` is the number of
-  /// executed items.
+  /// all items. If the server has refused only items, it is the status of the first refused item.
   STRIDEWIRE_EVENT_REPLY = 6,
   /// Uses world, command, item_index, avatar, request_id, status, text. Reports an item that the
   /// server refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
@@ -351,8 +351,7 @@ typedef enum stridewire_outcome {
   STRIDEWIRE_OUTCOME_MAX = 0x7fffffff
 } stridewire_outcome;
 
-/// An event. Fields that its type does not use are 0, except `group`, which is -1, and `kind`,
-/// which is STRIDEWIRE_KIND_STAND in events about an avatar.
+/// An event. Ignore the fields that its type does not use.
 typedef struct stridewire_event {
   stridewire_event_type type;
   stridewire_status status;
@@ -369,9 +368,9 @@ typedef struct stridewire_event {
   stridewire_foot foot;
   int32_t group;         ///< Index of the motion group in the library, or -1.
   uint8_t resumed;       ///< 1: the session survived the reconnect.
-  uint8_t extrapolated;  ///< 1: `applied` lies outside the range of the examples.
-  /// 1: `applied` differs from `requested`, which is out of reach. In ACCEPTED: the library's steps
-  /// do not permit the requested walking speed.
+  uint8_t extrapolated;  ///< 1: `applied` lies outside the convex hull of the examples.
+  /// STARTED: `requested` is out of reach and was clamped. ACCEPTED: the library's steps do not
+  /// permit the requested walking speed.
   uint8_t clamped;
   uint8_t cut_short;  ///< 1: another request interrupted the movement.
   double position_m[3];
@@ -508,7 +507,8 @@ stridewire_status stridewire_client_list_avatars(stridewire_client* client, stri
 /// with NOT_READY before the first pose or pong.
 stridewire_status stridewire_client_server_time(stridewire_client* client, double* time_s);
 
-/// Gets the time at which to sample poses: the server time minus a delay. The client chooses the
+/// Gets the time at which to sample poses: the server time minus a delay. Fails with NOT_READY
+/// before the first pose or pong. Unless `render_delay_s` sets the delay, the client chooses the
 /// smallest delay with which poses arrive in time, and changes it smoothly: render time runs at
 /// most 5 % faster or slower than the server. It jumps only
 ///   - in a new session,
@@ -560,7 +560,7 @@ typedef struct stridewire_pose {
   uint32_t joint_count;
   uint64_t tick;  ///< Tick of the last received pose at or before `time_s`.
   double time_s;  ///< Server time of this pose.
-  double held_s;  ///< HELD and EXTRAPOLATED: seconds since the last received pose.
+  double held_s;  ///< HELD and EXTRAPOLATED: seconds since the pose of `tick`.
   float root_position_m[3];
   /// RAW: 1 if clients must not interpolate between the previous pose and this one.
   uint8_t discontinuity;

@@ -48,9 +48,9 @@ typedef enum stridewire_foot {
 typedef enum stridewire_interrupt {
   STRIDEWIRE_QUEUED = 0,  ///< The movement begins after all queued movements.
   /// The movement begins after the current step or jump. A current stand ends at once, and a walk
-  /// ends after its current step. The queue is dropped.
+  /// ends after its current step.
   STRIDEWIRE_AFTER_MOVEMENT = 1,
-  /// The movement begins as soon as the feet allow it. The queue is dropped.
+  /// The movement begins as soon as the feet allow it.
   STRIDEWIRE_NOW = 2,
   STRIDEWIRE_INTERRUPT_MAX = 0x7fffffff
 } stridewire_interrupt;
@@ -76,7 +76,8 @@ typedef struct stridewire_movement {
   uint8_t has_at;
   /// Step with `has_at`: 1 uses `heading_rad`, 0 leaves the heading of the foot to the server.
   uint8_t has_heading;
-  /// Step with `has_at`: world position of the ball of the foot. Walk: its destination.
+  /// Step with `has_at`: world position of the ball of the foot. Walk: destination of the base
+  /// frame; its height is ignored.
   double at_m[3];
   /// Step with `has_at` and `has_heading`: heading of the foot. Walk: heading at the destination.
   double heading_rad;
@@ -147,7 +148,8 @@ typedef struct stridewire_planting {
 /// Form in which the server sends poses.
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,  ///< The server sends float32 values, without loss.
-  /// The server sends compressed poses. The error of each joint and end site is at most 1 mm.
+  /// The server sends compressed poses. With STRIDEWIRE_DETAIL_ALL, the error of each joint and end
+  /// site is at most 1 mm.
   STRIDEWIRE_QUANTISED = 1,
   /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
   /// equal those of STRIDEWIRE_FULL bit for bit. The client fetches the world's library first,
@@ -197,7 +199,8 @@ typedef struct stridewire_observation {
   uint16_t every_n_ticks;  ///< Interval of poses in ticks, 1 to 3600.
   /// 1: the client also receives the world's events. Controllers always receive them.
   uint8_t with_events;
-  const uint32_t* avatars;  ///< Ids of the avatars to observe. NULL: all avatars.
+  /// Ids of the avatars to observe. NULL: all avatars, or those inside `region`.
+  const uint32_t* avatars;
   /// Number of ids: 0 if `avatars` is NULL, at most STRIDEWIRE_MAX_ITEMS.
   size_t avatar_count;
   /// Detail of the poses. Values other than 0 require STRIDEWIRE_QUANTISED.

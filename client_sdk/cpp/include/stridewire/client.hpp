@@ -71,19 +71,20 @@ inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id
   m.heading_rad = heading_rad.value_or(0.0);
   return m;
 }
-/// Returns a copy of a step request, which the server rejects if the foot cannot land exactly on
-/// the requested footprint.
+/// Returns a copy of a step request with `exact_only` set: the server rejects the step unless the
+/// foot can land exactly on the requested footprint.
 inline stridewire_movement ExactOnly(stridewire_movement step) {
   step.exact_only = 1;
   return step;
 }
-/// Returns a copy of a request for a step or jump, for which the server plays the nearest movement
-/// of its library, however far it is from the request.
+/// Returns a copy of a request for a step or jump with `allow_nearest` set: the avatar plays the
+/// nearest movement of the library, however far it is from the request.
 inline stridewire_movement AllowNearest(stridewire_movement movement) {
   movement.allow_nearest = 1;
   return movement;
 }
-/// Returns a copy of a request, which interrupts the current movement and drops the queue.
+/// Returns a copy of a request with the interrupt STRIDEWIRE_NOW: it begins as soon as the feet
+/// allow it, and drops the queue.
 inline stridewire_movement Now(stridewire_movement movement) {
   movement.interrupt = STRIDEWIRE_NOW;
   return movement;
