@@ -428,7 +428,7 @@ export class App {
   private updateStreamCosts(ms: number, avatars: number): void {
     const {poseStream, fetchesLibrary} = this.worldPanes;
     this.viewPanel.setStreamMode(poseStream.mode, fetchesLibrary ?
-      'Fetching the motion library. Until then, the server sends compressed poses.' :
+      'Fetching the motion library. Until then, the server sends poses.' :
       streamModes[poseStream.mode].description);
     this.status.setStreamMode(streamModes[poseStream.mode].label);
     this.viewPanel.setDetailEnabled(

@@ -119,7 +119,7 @@ export class FootprintTool {
       state.queue.filter(({type, atM}) => type === 'step' && atM !== null) : [];
   }
 
-  /** Updates the outlines. A dragged outline is drawn beneath the pointer. */
+  /** Updates the outlines. A dragged outline is drawn under the pointer. */
   update(): void {
     for (const pane of this.host.panes) {
       const {x = 0, z = 0} = pane.view.locate(pane.view.selectedAvatar) ?? {};

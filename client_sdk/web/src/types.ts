@@ -18,8 +18,8 @@ export type {
 /**
  * Precision of received poses.
  * - `full`: float32 values, exactly as the server computed them.
- * - `quantised`: about a quarter of the bytes. The error of each joint and end site is at most 1
- *   mm. Poses of older servers have 40 % of the bytes of `full`.
+ * - `quantised`: about a quarter of the bytes. With detail `all`, the error of each joint and end
+ *   site is at most 1 mm.
  * - `movement`: the client evaluates movements with the world's motion library, which it fetches
  *   from the server first. The poses are exactly those of the server. A recording stores them with
  *   the precision of `quantised`.
@@ -66,7 +66,7 @@ export interface Reply {
   readonly ok: boolean;
   /**
    * Status code, one of `Status`; 0 if ok. 1xx: the caller, 2xx: data, 3xx: network, 4xx: server.
-   * If only some items failed: the code of the first failed one. `accepted` counts the others.
+   * If only items failed: the code of the first failed one.
    */
   readonly code: number;
   /** Name of the code, for example `no_such_avatar`. */
@@ -196,11 +196,11 @@ export interface Subscription {
 }
 
 /**
- * Something that happened to an avatar. Fields that the type does not use are 0, empty or null,
- * except `group`, which is -1, and `kind`, which is `stand`.
+ * Something that happened to an avatar. Ignore fields that the type does not use.
  */
 export interface WorldEvent extends Omit<messages.Event, 'foot'> {
-  /** Foot strike: the foot that landed. Rejected step: the foot that should have moved. */
+  /** Foot strike: the foot that landed. Rejected step: the foot that should have moved. Otherwise
+   * null. */
   readonly foot: Foot | null;
 }
 
@@ -241,7 +241,7 @@ export interface Pose {
   standing: boolean;
   /** Detail in which the server sent the pose. */
   detail: PoseDetail;
-  /** If the pose is extrapolated or held: time since the last received pose. Otherwise 0. */
+  /** If the pose is extrapolated or held: time since the pose of `tick`. Otherwise 0. */
   heldS: number;
   /**
    * Poses with equal segments belong to one continuous motion. If a pose and the one displayed

@@ -517,8 +517,8 @@ STRIDEWIRE_EXPORT(avatars) std::size_t Avatars(Client* client, stridewire_world 
 
 /// Samples one avatar. Returns 0 if its pose is missing, 1 if it is interpolated, 2 if it is held
 /// and 3 if it is extrapolated. results: 0 number of joints, 1 address of the root's position,
-/// 2 address of the rotations, 3 tick, 4 flags (CrowdFlags), 5 time since the last pose if the
-/// result is not 1, 6 segment.
+/// 2 address of the rotations, 3 tick, 4 flags (CrowdFlags), 5 time since the pose of this tick if
+/// the result is not 1, 6 segment.
 STRIDEWIRE_EXPORT(sample)
 std::uint32_t Sample(Client* client, stridewire_world world, protocol::AvatarId avatar,
                      double time_s) {
