@@ -138,8 +138,8 @@ class PoseHistory {
   /// Computes the pose at `time_s`: evaluates the movement if one determines the pose, otherwise
   /// interpolates between poses (InterpolatePose). After the newest pose, extrapolates. In the
   /// interval before a discontinuity, returns the pose at the interval's start, or extrapolates if
-  /// the interval is more than 1.5 times as long as the one before. Returns nullopt for times before
-  /// the oldest pose.
+  /// this interval is more than 1.5 times as long as the previous one. Returns nullopt before the
+  /// oldest pose.
   [[nodiscard]] std::optional<Sampled> Sample(double time_s, Vec3& root_position_m,
                                               std::span<Quat> rotations) const;
 

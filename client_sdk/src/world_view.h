@@ -133,9 +133,9 @@ class WorldView : public PoseSink {
   /// Changes whenever the result of Avatars changes.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
 
-  /// Returns the recording of the last seconds. It contains the received batches. If this client
-  /// evaluates the poses, it contains the movements instead, and the poses of avatars with layers
-  /// in compact form. Clear also clears the recording.
+  /// Returns the recording of the last seconds. It contains the received batches. In movement mode,
+  /// it contains the movements instead, and encoded poses of avatars without a movement or with
+  /// layers. Clear also clears the recording.
   [[nodiscard]] PoseRecording& recording() { return recording_; }
 
   /// Samples all avatars at a server time, for display, and counts the poses.

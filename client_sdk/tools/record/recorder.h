@@ -45,7 +45,8 @@ struct Recording {
   Clip clip;  ///< Recorded motion with one frame per tick.
   std::string library_hash;
   std::uint64_t first_tick = 0;
-  /// Number of ticks that were not received. They are interpolated from their neighbours.
+  /// Number of ticks that were not received. Their frames are interpolated, or repeat the last pose
+  /// before a discontinuity.
   std::uint64_t ticks_missing = 0;
   /// Runs of missing frames; at most kMaxGaps of them are listed.
   std::vector<Gap> gaps;
@@ -62,8 +63,9 @@ inline constexpr std::size_t kMaxGaps = 1000;
 /// Records one avatar for `seconds` of server time, counted in ticks from the first received pose.
 /// If the server restarts, the recording continues when the avatar is back. Waits at most
 /// `timeout_s` for the connection, for the avatar and for each pose. Calls `progress`, unless it is
-/// empty, with the number of recorded seconds. Fails with kIo if there is no connection or no such
-/// avatar.
+/// empty, with the number of recorded seconds. Fails with kInvalidArgument for an invalid address,
+/// world or avatar id, with kLimitExceeded for too many frames, and with kIo if no pose arrives, for
+/// example because the avatar does not exist.
 [[nodiscard]] Expected<Recording> Record(const Options& options,
                                          const std::function<void(double)>& progress);
 

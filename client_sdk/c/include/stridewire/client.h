@@ -238,8 +238,8 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
                                                uint64_t* command);
 
 /// Enables or disables foot planting from the next movement of each avatar on. Without planting,
-/// the server rejects steps with `exact_only`. An ITEM event reports NO_MOVEMENT if the skeleton
-/// does not support planting.
+/// the server rejects steps with `exact_only`. If the skeleton does not support planting, enabling
+/// it fails with NO_MOVEMENT in an ITEM event.
 stridewire_status stridewire_client_set_planting(stridewire_client* client, stridewire_world world,
                                                  const stridewire_planting* planting,
                                                  uint64_t* command);
