@@ -208,9 +208,9 @@ export class AvatarCommands {
   }
 
   /**
-   * Spawns avatars on a spiral. If the world already has avatars, the spiral starts farther from
-   * its centre, which is the camera's target. The server removes the new avatars when the page
-   * closes, unless the world is persistent.
+   * Spawns avatars on a spiral around the origin. If the world already has avatars, the spiral is
+   * around the camera's target and starts farther out. The server removes the new avatars when the
+   * page closes, unless the world is persistent.
    */
   async spawn(pane: WorldPane | null, count: number, walkRandomly: boolean): Promise<void> {
     if (!pane) return;
