@@ -60,9 +60,9 @@ class SessionCommands : public SessionState {
   template <typename Message>
   stridewire_status Enqueue(stridewire_world world, Message message, std::size_t bytes,
                             std::uint64_t& command);
-  /// Carries out the last unsent command of a world, which moves or stops a subscription, at once.
-  /// The client is closed, so only the subscription's unsent Observe has to change, if there is
-  /// one. `moved` is its new message; null: the subscription was stopped.
+  /// Executes the last unsent command of a world, which moves or stops a subscription, without the
+  /// server, because the client is closed. Changes or removes the unsent Observe of the
+  /// subscription, if any. `moved` is the new Observe; null: the subscription was stopped.
   void ChangeWhileClosed(World& world, std::uint32_t subscription, const protocol::Observe* moved);
   /// Encodes all commands that may be sent now.
   void Pump();

@@ -72,8 +72,8 @@ class ReplicaSet {
 
   /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded if
   /// there are too many shards. Fails with the error of AvatarReplica::Apply if a record is invalid
-  /// or was made with another library. After an error, the shard's avatars are unknown until the
-  /// server sends their next states.
+  /// or was made with another library. After an error, the avatars of the shard are invalid until
+  /// the server sends their next states.
   [[nodiscard]] Status Apply(const protocol::Movements& message, PoseSink& sink);
 
   [[nodiscard]] const std::shared_ptr<const MotionLibrary>& library() const { return library_; }

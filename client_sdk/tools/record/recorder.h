@@ -63,9 +63,9 @@ inline constexpr std::size_t kMaxGaps = 1000;
 /// Records one avatar for `seconds` of server time, counted in ticks from the first received pose.
 /// If the server restarts, the recording continues when the avatar is back. Waits at most
 /// `timeout_s` for the connection, for the avatar and for each pose. Calls `progress`, unless it is
-/// empty, with the number of recorded seconds. Fails with kInvalidArgument for an invalid address,
-/// world or avatar id, with kLimitExceeded for too many frames, and with kIo if no pose arrives, for
-/// example because the avatar does not exist.
+/// empty, with the number of recorded seconds. Fails with kIo if no pose arrives, for example
+/// because the avatar does not exist, with kInvalidArgument for an invalid address, world name or
+/// avatar id, and with kLimitExceeded for too many frames.
 [[nodiscard]] Expected<Recording> Record(const Options& options,
                                          const std::function<void(double)>& progress);
 
