@@ -74,8 +74,8 @@ class Client:
     `address` is HOST:PORT, or a list of up to 16 servers that offer the same worlds. The client
     tries them in order. After a lost connection, it starts with the same server.
 
-    `timeout_s` limits every call that waits for the server, except `World.wait`, which has its own
-    limit. A client is not thread-safe.
+    `timeout_s` limits every call that waits for the server, except `World.wait` and `World.record`,
+    which have their own limits. A client is not thread-safe.
     """
 
     #: Number of events that are kept for `poll_events`, and in each world for `wait`. If there are
