@@ -20,7 +20,7 @@ export interface CommandHost {
   goLive(): void;
   /** Shows a message to the user. */
   notify(text: string): void;
-  /** Called after the queues of these avatars have been cleared. */
+  /** Called when the page clears the queues of these avatars. */
   onCancelled(pane: WorldPane, avatars: readonly number[]): void;
   /** Clears the panel's choice of terrain, because the world may have none of the samples. */
   resetTerrainChoice(): void;

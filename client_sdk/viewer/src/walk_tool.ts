@@ -204,7 +204,7 @@ export class WalkTool {
     }
   }
 
-  /** Call after the queues of these avatars have been cleared. */
+  /** Call when the page clears the queues of these avatars. */
   onCancelled(pane: WorldPane, avatars: readonly number[]): void {
     this.removeWalks((walk) => walk.pane === pane && avatars.includes(walk.avatar));
     this.update();
