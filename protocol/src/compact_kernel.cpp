@@ -137,8 +137,8 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
       }
       if (joint.is_omitted) continue;
       if (joint.parent >= 0) {
-        // Computes q = e q, where e = (ex, ey, ez, 1) is the error of the parent: a rotation by one
-        // or two thousandths of a radian.
+        // Computes q = e q, where e = (ex, ey, ez, 1) is the error of the parent, a rotation by a
+        // small angle.
         const float* error =
             work.errors + static_cast<std::size_t>(joint.parent) * 3 * kBlock + lane;
         const V ex = hn::LoadU(d, error);
