@@ -39,9 +39,10 @@ struct HttpAnswer {
 };
 
 /// A small HTTP/1.1 server. It supports GET and HEAD for registered pages, and one path that
-/// becomes a WebSocket. A request has at most 8 KiB and must be received within 10 s; a response
-/// must be sent within 60 s. The server runs on one thread, except for slow pages, which have their
-/// own thread. At most 16 requests for slow pages may be waiting or in progress.
+/// becomes a WebSocket. The header and the body of a request have at most 8 KiB each. A request
+/// must be received within 10 s, and a response must be sent within 60 s. The server runs on one
+/// thread, except for slow pages, which have their own thread. At most 16 requests for slow pages
+/// may be waiting or in progress.
 class HttpServer {
  public:
   using Page = std::function<HttpAnswer(const HttpQuery&)>;

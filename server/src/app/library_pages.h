@@ -24,7 +24,8 @@ namespace stridewire::server {
 ///   /libraries/HASH/GROUP/example.json?index=I  the movement of one example
 ///   /libraries/HASH/GROUP/errors.json?x=L&y=L&p=A,B,...&cells=N&correction=0|1
 ///                                               the parameter errors on a grid: parameters x and y
-///                                               cover their ranges, others have the values of p
+///                                               cover their ranges and 10 % more at each end,
+///                                               others have the values of p
 ///
 /// Invalid queries get status 400 with an explanation; unknown libraries and groups get 404.
 /// Thread-safe.

@@ -34,9 +34,8 @@ class ServerThread {
 ///   then:    each shard passes complete batches to its sessions, or composes smaller batches for
 ///            sessions that observe selected avatars or a region
 ///
-/// A received command only enters the inboxes of the shards that execute it. Shards exchange values
-/// with Post. They share immutable data, and only the following mutable data: the counters and the
-/// terrain of World, and AvatarBudget.
+/// A received command only enters the inboxes of the shards that execute it. Shards exchange data
+/// with Post. They share World and AvatarBudget, which are safe to use from several threads.
 class Shard : public SessionHost {
  public:
   /// Borrows all references.
@@ -62,7 +61,7 @@ class Shard : public SessionHost {
   void Adopt(Arrival arrival);
   /// Ends all sessions after answering their pending commands.
   void Drain();
-  /// Calls `done` on this shard's thread when its connections have sent their messages.
+  /// Calls `done` on this shard's thread when all its connections are closed.
   void WhenDrained(std::function<void()> done);
 
  private:

@@ -52,8 +52,8 @@ class ViewerFiles {
   std::size_t bytes_ = 0;
 };
 
-/// Returns the security headers of a page. The page may load scripts, styles and images only from
-/// this server, and may not be embedded in frames.
+/// Returns the security headers of a page. The page may not load scripts, styles or images from
+/// other servers, and may not be embedded in frames.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> PageHeaders();
 
 }  // namespace stridewire::server

@@ -47,7 +47,7 @@ struct Config {
   std::vector<std::string> allowed_origins;
   /// Addresses and networks of proxies (TrustedProxies::Parse).
   std::vector<std::string> trusted_proxies;
-  /// Folder of the viewer. Empty: the viewer that was installed with the program.
+  /// Folder of the viewer. Empty: the viewer that was built or installed with the program.
   std::string viewer_dir;
   std::string library = "builtin";
   std::string data_dir;  ///< Reserved for stored worlds; the server writes nothing yet.
@@ -100,8 +100,8 @@ struct ConfigKey {
 /// characters. A world name may thus contain slashes, so it must not be used as a file name.
 [[nodiscard]] bool IsWorldName(std::string_view name);
 
-/// Reads TOML text into `config`. Errors contain `name`, which is the file's name, the line and
-/// the key. On error, `config` is unchanged.
+/// Reads TOML text into `config`. `name` is the name of the file. Errors contain it, with the line
+/// and the key or, for a syntax error, its description. On error, `config` is unchanged.
 [[nodiscard]] Status ReadConfigText(std::string_view text, const std::string& name, Config& config);
 
 /// Checks rules that concern several keys, such as a public address without allow_insecure.

@@ -53,7 +53,8 @@ struct Limits {
   int max_pending_commands = 256;
 
   // Memory of one session.
-  /// Outgoing messages except poses and movements. Movements have a second budget of this size.
+  /// Outgoing messages except poses, movements and terrain. Movements have a second budget of this
+  /// size.
   std::size_t control_buffer_bytes = std::size_t{4} << 20;
   int observer_backlog_ticks = 4;  ///< Pose batches that may wait per world, mode and shard.
   std::size_t reply_cache_bytes = std::size_t{4} << 20;

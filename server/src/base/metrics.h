@@ -25,7 +25,8 @@ class Count {
   std::atomic<std::uint64_t> value_{0};
 };
 
-/// Histogram of times in seconds with fixed bins. One thread writes, any thread reads.
+/// Histogram of times in seconds with fixed bins. One thread calls Observe; any thread may call the
+/// other functions.
 class TimeHistogram {
  public:
   static constexpr std::array<double, 12> kUpperBoundsS = {

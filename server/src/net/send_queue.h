@@ -39,8 +39,8 @@ struct PoseFrames {
 /// kind starves. Terrain waits until no control message is left, because it belongs to a WorldInfo
 /// that is sent as control.
 ///
-/// Memory is bounded. Events that exceed the control budget are rejected, and the session limits
-/// replies by pausing to read commands. Frames are shared by all connections that send them.
+/// Memory is bounded. Events that exceed the control budget are rejected. While many replies wait,
+/// the session reads no commands. Frames are shared by all connections that send them.
 class SendQueue {
  public:
   /// Creates an empty queue. Movements have a second budget of `control_budget_bytes`.

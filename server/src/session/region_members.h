@@ -29,8 +29,8 @@ namespace stridewire::server {
 class RegionMembers {
  public:
   /// Sets the region. Beyond its rings, poses are due every `every_n_ticks` ticks in `mode`.
-  /// `default_leave_m` applies if the region does not contain a value. Members stay members while
-  /// they are in the new region.
+  /// `default_leave_m` applies if `region` has no leave_m. Members stay members while they are in
+  /// the new region.
   void Set(const protocol::Region& region, double default_leave_m, std::uint16_t every_n_ticks,
            protocol::PoseMode mode);
 

@@ -16,8 +16,8 @@ namespace stridewire::server {
 ///
 ///   forgotten <- first_seq ... answered or pending ... last_seq -> new
 ///
-/// At most `max_count` commands and `max_bytes` of replies are stored. Older replies are discarded
-/// ("forgotten"). The last reply and unanswered commands are never discarded.
+/// If there are more than `max_count` commands or `max_bytes` of replies, the oldest replies are
+/// discarded ("forgotten"), except the last one and those after an unanswered command.
 class ReplyCache {
  public:
   enum class Verdict : std::uint8_t {

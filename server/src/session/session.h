@@ -24,8 +24,7 @@ namespace stridewire::server {
 ///                          |  +---------Attach-----------+
 ///                          +---Goodbye, or the client cannot resume------------------> ended
 ///
-/// Memory is limited by Limits, whatever the client does: reply_cache_bytes, event_replay_bytes,
-/// twice control_buffer_bytes, and the connection.
+/// Limits bounds the memory of a session, whatever the client does.
 class Session : private ConnectionHandler {
  public:
   using Clock = Connection::Clock;
@@ -61,7 +60,7 @@ class Session : private ConnectionHandler {
   /// client may reconnect later. A session without a connection ends.
   void Drain();
 
-  /// Leaves all worlds and closes the connection. Afterwards the session may be destroyed.
+  /// Leaves all worlds, closes the connection, and lets the host destroy the session.
   void End();
 
   [[nodiscard]] bool is_ended() const { return is_ended_; }

@@ -49,8 +49,8 @@ std::string SpeedNote(const WalkSpeeds& speeds, const std::vector<protocol::Requ
 
 // Upper bound for the size of a refused item in a Reply.
 constexpr std::size_t kReplyItemBytes = 256;
-// This many heights or boxes of a terrain count as one item. The largest terrain then uses half of
-// the default request_burst.
+// This many heights or boxes of a terrain count as one item. The largest terrain then uses about
+// half of the default request_burst.
 constexpr std::size_t kNumbersPerItem = 32;
 
 }  // namespace

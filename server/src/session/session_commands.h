@@ -65,8 +65,8 @@ class SessionCommands {
   [[nodiscard]] protocol::Seq last_seq() const { return replies_.last_seq(); }
   [[nodiscard]] std::size_t pending_count() const { return pending_.size(); }
   [[nodiscard]] std::size_t pending_items() const { return pending_items_; }
-  /// Returns the maximum number of items of one command, for which a Reply that refuses all items
-  /// fits into a frame.
+  /// Returns the maximum number of items per command. A Reply that refuses this many items fits
+  /// into a frame.
   [[nodiscard]] static std::size_t MaxItems(const Limits& limits);
 
  private:

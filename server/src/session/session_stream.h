@@ -102,10 +102,11 @@ class SessionStream {
 
   /// Applies changed subscriptions to the movement feeds of a world.
   void UpdateMovementFeeds(const std::shared_ptr<World>& world);
-  /// If the send queue has room, requests from the shards the states of avatars that the movement
-  /// feeds still lack.
+  /// While the send queue has room for movements, requests the states that movement feeds need.
+  /// Restarts lost feeds if the queue contains no movements.
   void RequestStates();
-  /// Sends the terrain of a world. Flat ground is sent only if `even_if_flat`.
+  /// Sends the terrain of a world. If none was ever set, sends flat ground if `even_if_flat`,
+  /// otherwise nothing.
   void SendTerrain(const World& world, bool even_if_flat);
   /// Sends Lagging if batches or events were dropped since it was last sent.
   void SendLagging(Membership& membership);
@@ -134,7 +135,7 @@ class SessionStream {
   // Feeds by world and by the avatars' shard.
   std::map<std::pair<WorldId, int>, MovementFeed> movement_feeds_;
   std::uint32_t states_nonce_ = 0;
-  std::uint64_t gathered_tick_ = 0;  // Newest tick for which batches were sent.
+  std::uint64_t gathered_tick_ = 0;  // Newest tick with batches that were passed on.
   std::vector<bool> gathered_;       // [shard]: whether it has sent a batch of this tick.
   EventReplay event_replay_;
   std::uint64_t events_number_ = 0;  // Number of the last Events message.

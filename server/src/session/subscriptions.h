@@ -17,8 +17,8 @@ namespace stridewire::server {
 ///
 /// Subscriptions to the same world and mode share batches. If one of them covers all avatars, the
 /// session receives complete batches; otherwise it receives batches of exactly the avatars that any
-/// of them selects. A subscription with a region must be the only one of its world. It uses as many
-/// modes as its rings have levels of detail.
+/// of them selects. A subscription with a region must be the only one of its world. Its rings may
+/// have different modes.
 class Subscriptions {
  public:
   struct Subscription {
@@ -58,7 +58,8 @@ class Subscriptions {
   [[nodiscard]] bool HasRegion(WorldId world) const;
   [[nodiscard]] std::size_t region_count() const;
   /// Replaces the region of a subscription. Members stay members while they are in the new region.
-  /// Returns false if `id` has no region, or has another world or another mode beyond its rings.
+  /// Returns false if `id` does not exist, has no region, or has another world or another mode
+  /// beyond its rings.
   [[nodiscard]] bool MoveRegion(protocol::SubscriptionId id, const protocol::Observe& moved,
                                 double default_leave_m);
 
@@ -67,8 +68,8 @@ class Subscriptions {
     return channels_.contains({world, mode});
   }
   [[nodiscard]] SendInterval IntervalOf(WorldId world, protocol::PoseMode mode) const;
-  /// Returns the ascending ids of the selected avatars. Returns an empty list if complete batches
-  /// are needed, or if no poses are needed.
+  /// Returns the ascending ids of the selected avatars. Empty if the session needs complete
+  /// batches, a region or no poses.
   [[nodiscard]] std::span<const AvatarId> SelectedAvatars(WorldId world,
                                                           protocol::PoseMode mode) const;
   /// Returns a filter for the rings of this mode in the region of this world, or nullopt if there

@@ -30,10 +30,9 @@ struct PoseScratch {
   std::array<protocol::CompactCodec::Block, kMaxModes> blocks;
 };
 
-/// Evaluates and encodes the poses of a world's avatars for several ticks at once. A movement is
-/// fixed when it starts, so its future poses can be computed early. The evaluator then loads and
-/// blends the data of a movement once per up to 16 poses instead of once per pose. One cache per
-/// world and shard; not thread-safe.
+/// Evaluates and encodes the poses of a world's avatars for several ticks at once, which is faster
+/// than one tick at a time. This is possible because a movement is fixed when it starts. One cache
+/// per world and shard; not thread-safe.
 ///
 ///   cache.BeginStep(step, step_s, avatar_count);
 ///   for each avatar: cache.Request(slot, avatar);
@@ -64,9 +63,9 @@ struct PoseScratch {
 ///               Contains returns false and the slot must be scheduled or stored again.
 ///   constant    The slot contains one pose for all steps, because the avatar stands still.
 ///
-/// Backoff: if an avatar is interrupted before all its poses were used, the number of poses that
-/// the next FinishStep evaluates for it is halved (down to 1/8). It doubles again each time all
-/// poses were used.
+/// Backoff: if an avatar is interrupted before all its poses were used, the maximum number of poses
+/// that FinishStep evaluates for it is halved, down to 1/8 of the planes. The maximum doubles again
+/// each time all poses were used.
 ///
 /// Phases: FinishStep spreads the evaluation over several steps. Slots form groups of 8, and the
 /// groups take turns. A slot that is scheduled outside the turn of its group gets only the poses

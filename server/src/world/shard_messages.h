@@ -16,10 +16,9 @@
 #include "world/spatial_grid.h"
 #include "world/world.h"
 
-/// All messages between the threads of the server: from shard to shard (ShardMessage), and between
-/// the shards and the main thread (ServerMessage, ShardMessage). They are values, which the
-/// receiver owns. Shard::Post and ServerThread::Post are the only ways to send them to another
-/// thread.
+/// The messages between the threads of the server: from shard to shard (ShardMessage), and between
+/// the shards and the main thread (ServerMessage, ShardMessage). The receiver owns them.
+/// Shard::Post and ServerThread::Post send them to another thread.
 ///
 ///   session's shard                      avatars' shard               main thread
 ///     | WorldCommand, InspectRequest,          |                           |
@@ -192,7 +191,7 @@ struct PoseDelivery {
   std::uint64_t tick = 0;
   /// Number of poses in `parts` or, if it is empty, in `rows`.
   std::uint32_t avatar_count = 0;
-  /// Batch of all avatars; empty if no session observes all avatars.
+  /// Frames of the batch of all avatars; empty if no session needs this batch in this tick.
   std::vector<SharedFrame> parts;
   /// The encoded poses from which sessions compose smaller batches. Contains at least the poses of
   /// selected avatars and regions.

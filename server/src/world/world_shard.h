@@ -136,8 +136,8 @@ class WorldShard {
   std::span<const std::uint32_t> SelectedRows(protocol::PoseMode mode);
   std::span<const std::uint32_t> SelectedAndRegionRows(protocol::PoseMode mode,
                                                        const SpatialGrid& grid);
-  // The values that Encode needs from an avatar whose pose is in the cache. Each avatar is on
-  // another page of memory, so reading avatars a second time per tick would be slow.
+  // The values that Encode needs from an avatar whose pose is in the cache. They are copied because
+  // reading all avatars a second time per tick would be slow.
   struct CachedPose {
     std::uint64_t placed_tick;
     std::uint32_t slot;
