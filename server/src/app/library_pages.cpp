@@ -126,8 +126,8 @@ class MovementPreview {
     }
   }
 
-  // Returns the scaled distance between the parameters and the hull of the examples, which is
-  // enlarged by the fraction `growth`. Writes the nearest point of the hull to `nearest`.
+  // Projects the parameters onto the hull of the examples, enlarged by the fraction `growth`.
+  // Writes the nearest point to `nearest` and returns its scaled distance.
   double Project(const ParameterValues& p, double growth, ParameterValues& nearest) const {
     const auto d = static_cast<std::size_t>(p.count);
     nearest = p;
@@ -162,7 +162,8 @@ class MovementPreview {
     return LargestDifference(group_, p, MeasureMovement(library_, movement_, cache_, pose_));
   }
 
-  // Returns the frames of the movement as flat lists of root positions and of rotations x, y, z, w.
+  // Returns the frames of the movement as flat lists of times, root positions and rotations (x, y,
+  // z, w), with its keytimes, heading change and weights.
   Json Frames() {
     const double duration_s = movement_.duration_s();
     const int last =
@@ -321,7 +322,7 @@ HttpAnswer ErrorsPage(const MotionLibrary& library, int group_index, std::string
   };
   const auto [x0, x1] = range(px);
   const auto [y0, y1] = range(py);
-  Json errors = Json::array();  // Errors row by row, at the centres of cells. Null: out of range.
+  Json errors = Json::array();  // At the centres of cells, row by row. Null: out of range.
   double largest_m = 0.0;
   for (int row = 0; row < cells; ++row) {
     for (int column = 0; column < cells; ++column) {

@@ -15,7 +15,7 @@ using boost::system::error_code;
 
 constexpr std::size_t kReadBufferBytes = std::size_t{32} << 10;
 constexpr std::size_t kWriteBytes = std::size_t{256} << 10;
-// Number of pings that a silent peer receives within the idle timeout.
+// If nothing is received, pings are sent in intervals of the idle timeout divided by this.
 constexpr double kPingsPerIdleTimeout = 3.0;
 
 }  // namespace

@@ -25,8 +25,8 @@ bool IsSpawnable(const protocol::Placement& start) {
          std::abs(start.heading_rad) <= kMaxSpawnHeadingRad;
 }
 
-// Maximum number of dropped requests that are reported per tick. One command can drop millions,
-// whose events would take gigabytes at once.
+// Maximum number of dropped requests that are reported per tick. One command can drop millions of
+// requests, and their events would take gigabytes.
 constexpr std::size_t kMaxDroppedPerTick = 16384;
 
 ReplyItem NoSuchAvatar(std::uint32_t index, AvatarId avatar, protocol::RequestId request = 0) {
