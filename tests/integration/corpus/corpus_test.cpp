@@ -29,7 +29,7 @@ namespace stridewire::test {
 namespace {
 
 constexpr int kDefaultCount = 500;
-constexpr double kCountedShare = 0.98;  // Files whose steps must be counted right.
+constexpr double kCountedShare = 0.98;  // Least share of files with correct counts of steps.
 constexpr double kLegTolerance = 0.05;  // Relative error of the length of a leg.
 
 unsigned FromEnvironment(const char* name, unsigned otherwise) {
