@@ -64,8 +64,8 @@ struct PoseScratch {
 ///   constant    The slot contains one pose for all steps, because the avatar stands still.
 ///
 /// Backoff: if an avatar is interrupted before all its poses were used, the maximum number of poses
-/// that FinishStep evaluates for it is halved, down to 1/8 of the planes. The maximum doubles again
-/// each time all poses were used.
+/// that FinishStep evaluates for it is halved (down to 1/8). The maximum doubles again each time
+/// all poses were used.
 ///
 /// Phases: FinishStep spreads the evaluation over several steps. Slots form groups of 8, and the
 /// groups take turns. A slot that is scheduled outside the turn of its group gets only the poses
