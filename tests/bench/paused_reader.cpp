@@ -1,8 +1,8 @@
 // paused_reader STRIDEWIRED [SECONDS [AVATARS [WRITE_TIMEOUT_S]]]
 //
 // Measures the memory of the server while a WebSocket client stops reading, and what the client
-// receives when it continues. Prints one value per line. The exit code is 1 if the server buffered
-// more than its limit or sent no current pose.
+// receives when it continues. Prints one value per line. The exit code is 1 if the memory of the
+// server grew by 16 MiB or more, or if the client received no current pose.
 #include <unistd.h>
 
 #include <cstdio>

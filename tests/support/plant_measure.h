@@ -16,7 +16,7 @@ namespace stridewire {
 struct PlantFigures {
   int contacts = 0;
   double largest_drift_m =
-      0.0;  ///< Largest horizontal distance of a planted ball to its footprint.
+      0.0;  ///< Largest horizontal distance of a planted ball from its footprint.
   /// Largest mean speed of a planted ball over a tenth of a second.
   double largest_speed_m_s = 0.0;
   double least_knee_deg = 180.0;
