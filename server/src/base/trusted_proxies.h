@@ -24,11 +24,10 @@ class TrustedProxies {
 
   /// Returns the address of the client of a connection from `peer`. `forwarded` is the content of
   /// X-Forwarded-For: addresses separated by commas, to which each proxy appends the address of its
-  /// own peer. Returns `peer` if it is not trusted. Otherwise, returns the last address in the list
-  /// that is not trusted. The addresses before it are ignored, because a client can send a header
-  /// with any addresses. If all are trusted, returns the first one. If the search from the end
-  /// reaches an entry that is not an address, returns the address after it, or `peer` if the entry
-  /// is the last one.
+  /// own peer. The search starts at `peer` and goes through the list from its end. It stops at the
+  /// first address that is not trusted, at the start of the list, or before an entry that is not an
+  /// address, and returns the address at which it stopped. The rest of the list is ignored, because
+  /// a client can send a header with any addresses.
   [[nodiscard]] boost::asio::ip::address ClientOf(const boost::asio::ip::address& peer,
                                                   std::string_view forwarded) const;
 
