@@ -61,11 +61,11 @@ struct SmoothGroup {
                                                    const GridLayout& layout,
                                                    const Skeleton& skeleton);
 
-// Chooses the smoothness with which the examples reproduce each other best. For this purpose, each
-// example is left out in turn, and its parameters are projected onto the enlarged hull of the
-// others, as for requests. The root mean square distances of linearly blended joint positions are
-// summed. `products`: see MovementProducts. Returns nullopt if there are too few examples, or if
-// the weights cannot be solved.
+// Chooses the smoothness with which the examples reproduce each other best. Each example is blended
+// from the others, at its own parameters, projected onto the enlarged hull of the others as for
+// requests. The error is the root mean square distance between the linearly blended joint positions
+// and those of the example. The smoothness with the smallest sum of errors is chosen. `products`:
+// see MovementProducts. Returns nullopt if there are too few examples or no weights can be solved.
 [[nodiscard]] std::optional<Smoothness> ChooseSmoothness(const MotionGroup& group,
                                                          std::span<const int> examples,
                                                          std::span<const double> products);

@@ -33,9 +33,9 @@ constexpr double kMinTravel = 0.6;
 constexpr double kTravelRatio = 2.0;
 // A figure on a level floor moves less than this along the up axis.
 constexpr double kMaxRise = 0.3;
-// Used by RestUpInWorld if no floor determines the up axis. The fixed rotation of the joints above
-// the root is then applied to the up axis of the rest pose only if it increases the cosine of the
-// angle between this axis and the mean direction from the feet to the hips by at least this much.
+// RestUpInWorld chooses between the up axis of the rest pose and the same axis after the fixed
+// rotation of the joints above the root. If floors do not decide, the rotated axis must be nearer
+// to the mean direction from the feet to the hips: its cosine must be larger by this much.
 constexpr double kClearGain = 0.5;
 // If the sum of the two unit foot vectors is shorter than this, the feet have no common direction.
 constexpr double kClearFeet = 0.5;

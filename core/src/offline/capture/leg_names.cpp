@@ -96,7 +96,7 @@ bool AnyWord(std::string_view name, bool (*test)(std::string_view)) {
   return std::ranges::any_of(SplitWords(name), [&](const std::string& word) { return test(word); });
 }
 
-// Reads names that are joined with their side: "lfemur", "leftfoot", "footright".
+// Reads names without a separator between side and part: "lfemur", "leftfoot", "footright".
 LegName ReadJoinedName(Words words) {
   if (words.empty()) return {};
   const std::string last = words.back();

@@ -29,7 +29,7 @@ struct Completion {
 /// spot and while walking, steps sideways and steps backward. Generated steps have the proportions,
 /// the posture and the cadence of the captured person. They begin and end in the stand pose, in
 /// poses of the captured strides, or between the two. There are four groups of basic steps:
-/// straight, backward, turning and sideways. If one step of a group is lacking, for example a turn
+/// straight, backward, turning and sideways. If one step of a group is missing, for example a turn
 /// to the left, the whole group is generated for both feet. The function adds neither climbing
 /// steps nor jumps.
 ///

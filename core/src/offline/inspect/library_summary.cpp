@@ -205,7 +205,7 @@ class MissingFinder {
   explicit MissingFinder(LibrarySummary& summary) : summary_(summary) {}
 
   // `what` is plural, for example "starts". `names` contains a phrase per side, for example "with
-  // the left foot". `record` states which recording would contain the movement.
+  // the left foot". `record` is the advice if both are missing.
   void Check(const LibrarySummary::Sides& sides, const std::string& what,
              const std::array<std::string, 2>& names, const std::string& record) {
     const bool has[2] = {sides[0].is_available(), sides[1].is_available()};

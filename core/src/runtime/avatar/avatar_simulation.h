@@ -169,8 +169,8 @@ class AvatarSimulation {
   /// While it stays the same, displayed_movement() and movement_time_s() determine the displayed
   /// pose without layers.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// True if the avatar moves or idles, has no layers, and the last Advance produced neither events
-  /// nor changes.
+  /// True if the avatar moves or idles without layers, the last Advance produced neither events nor
+  /// a change(), and no call since then has scheduled an event.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
   /// Prefetches the cache line that is_event_free(), time_s(), revision() and movement_time_s()
   /// read, for callers that check many avatars.

@@ -124,7 +124,7 @@ struct FootPlan {
   /// fade began.
   std::array<std::array<Quat, 3>, 2> plant_fade_rotations{};
   DVec3 missed_m = DVec3(0.0);  ///< Horizontal vector from the planned to the requested footprint.
-  /// Difference between the headings of the planned and the requested footprint.
+  /// Heading of the requested footprint minus that of the planned one.
   double missed_rad = 0.0;
 
   [[nodiscard]] const FootTrajectory& foot(Foot f) const {

@@ -10,7 +10,7 @@
 namespace stridewire {
 namespace {
 
-// If a path is shorter than this, its direction does not matter.
+// If the requested path is shorter than this, its direction does not matter.
 constexpr double kShortestPathM = 0.15;
 // Places closer than this are the same, whatever the directions of the paths to them.
 constexpr double kSamePlaceM = 0.05;

@@ -24,7 +24,7 @@ struct KeyBlend {
     } else {
       position = std::clamp(position, 0.0, count - 1.0);
     }
-    // `position` may be rounded up to `count`.
+    // Rounding may make `position` equal to `count`.
     const auto key = std::min(std::floor(position), count - 1.0);
     const auto u = static_cast<float>(std::min(position - key, 1.0));
     for (int i = 0; i < 4; ++i) {

@@ -256,7 +256,7 @@ struct FootTarget {
   SoaQuat rotation;
 };
 
-// A leg while it is solved: its bones in the blended pose, and the new ones.
+// Vectors along the bones of a leg, in the blended pose and after inverse kinematics (`new_`).
 struct SoaBones {
   SoaVec3 thigh, shank, new_thigh, new_shank;
 };
