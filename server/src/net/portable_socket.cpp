@@ -15,7 +15,7 @@ PortableSocket::~PortableSocket() {
 
 void PortableSocket::Prepare(Traffic& traffic, std::size_t send_buffer_bytes) {
   traffic_ = &traffic;
-  // An error can be ignored, because the first read of the socket reports it as well.
+  // Errors are ignored. If the socket is broken, its first read fails as well.
   error_code ignored;
   socket_->set_option(asio::ip::tcp::no_delay(true), ignored);
   socket_->non_blocking(true, ignored);  // Synchronous calls must not block the thread either.

@@ -55,7 +55,7 @@ class RegionMembers {
   [[nodiscard]] Change Update(const PoseDelivery& delivery);
   /// Updates the members without poses, for movement mode.
   [[nodiscard]] Change Update(const MovementDelivery& delivery);
-  /// Returns the ascending ids of the members on a shard.
+  /// Returns the ids of the members on a shard, in ascending order.
   [[nodiscard]] const std::vector<AvatarId>& members(int shard) { return shards_[shard].members; }
 
  private:

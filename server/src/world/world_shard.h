@@ -180,7 +180,7 @@ class WorldShard {
   // Number of steps that are left in the current Advance.
   std::uint16_t steps_left_ = 0;
   std::shared_ptr<const WorldTerrain> terrain_;  // Terrain in use; null: flat ground.
-  // Terrains that apply at later ticks, ordered by tick.
+  // Terrains that apply from later ticks on, ordered by tick.
   std::deque<TerrainPart> next_terrains_;
 
   // Movements.
@@ -194,7 +194,7 @@ class WorldShard {
   std::array<std::vector<std::uint32_t>, kSentModes.size()> selected_rows_;  // by mode
   std::array<bool, kSentModes.size()> last_had_poses_{};                     // by mode
   std::array<RowsPool, kSentModes.size()> rows_;                             // by mode
-  std::vector<CachedPose> cached_poses_;  // Of the rows of the last CachePoses, in their order.
+  std::vector<CachedPose> cached_poses_;  // [i]: pose of the i-th row in the last CachePoses call.
   // Positions of the avatars at grid_tick_.
   std::shared_ptr<const SpatialGrid> grid_;
   std::uint64_t grid_tick_ = 0;
