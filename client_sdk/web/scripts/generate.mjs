@@ -35,8 +35,8 @@ if (!existsSync(last) || statSync(last).mtimeMs < newest) {
       run('PYTHON', 'python3', 'python3', [`${generator}/generate.py`, schema, kind, out]);
   generate('flatc');
   run('FLATC', 'flatc', 'flatbuffers-compiler', ['--ts', '-o', out, `${out}/stridewire.fbs`]);
-  // The index that flatc 2.0.8 generates omits tables without references, which includes all
-  // messages.
+  // The index that flatc 2.0.8 generates omits each table to which no other table refers, and
+  // therefore all messages.
   const modules = readdirSync(`${out}/stridewire/wire`).sort();
   writeFileSync(`${out}/wire.ts`, modules.map((file) =>
       `export * from './stridewire/wire/${file.replace(/\.ts$/, '')}';\n`).join(''));

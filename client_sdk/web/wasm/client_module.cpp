@@ -456,7 +456,8 @@ std::uint32_t Command(Client* client, stridewire_world world, std::uint32_t type
   return Report(*client, status, command);
 }
 
-/// Returns the address of a stridewire_statistics, which a stridewire_playout follows.
+/// Returns the address of a stridewire_statistics, directly followed by a stridewire_playout. The
+/// next call overwrites both.
 STRIDEWIRE_EXPORT(statistics) const void* Statistics(Client* client, double now_s) {
   static struct {
     stridewire_statistics statistics;

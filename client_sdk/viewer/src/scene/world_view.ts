@@ -333,8 +333,9 @@ export class WorldView {
   }
 
   /**
-   * Projects the point at index `at` of `points` (x, y, z) to the page and writes it to
-   * `projected`. Returns false if it is behind the camera.
+   * Projects the point whose x, y and z begin at index `at` of `points`. Writes its position on the
+   * page in CSS pixels and its depth in metres to `projected`. Returns false if it is behind the
+   * camera or less than 5 cm in front of it.
    */
   project(points: ArrayLike<number>, at: number): boolean {
     point.set(points[at]!, points[at + 1]!, points[at + 2]!);

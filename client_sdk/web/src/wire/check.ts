@@ -3,7 +3,7 @@
 
 export type Fields = {readonly [name: string]: unknown};
 
-/** Path of a property. Errors state it with the index in the outermost list. */
+/** Path of a property and, in a list, the index in the outermost one: "items.avatar[3]". */
 export class Place {
   constructor(private readonly path: string, private readonly index = -1) {}
 
