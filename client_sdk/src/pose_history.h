@@ -215,12 +215,13 @@ class PoseHistory {
   };
   static_assert(sizeof(Entry) == 64);
 
-  /// A displayed pose that is not on the curve.
+  /// Hides the jump that occurs if a pose arrives after its time was displayed by extrapolation:
+  /// the difference between the displayed pose and the new curve fades out.
   struct Correction {
     enum class State : std::uint8_t {
       kNone,
-      kPending,  ///< The pose is the one that was displayed at `start_s`.
-      kActive,   ///< The pose is its difference from the curve at `start_s`.
+      kPending,  ///< The members below are the pose displayed at `start_s`.
+      kActive,   ///< They are the difference of that pose from the curve.
     };
     State state = State::kNone;
     double start_s = 0.0;

@@ -52,7 +52,7 @@ class PoseRecording {
   /// Returns the server time of the oldest recorded pose; NaN if the recording is empty.
   [[nodiscard]] double first_time_s() const;
   [[nodiscard]] double last_time_s() const { return last_time_s_; }
-  /// Returns the memory of batches, movements and decoded ticks.
+  /// Returns the memory of batches, movements and decoded ticks in bytes.
   [[nodiscard]] std::size_t bytes() const { return bytes_ + movements_.bytes() + DecodedBytes(); }
 
   /// Computes the poses at `time_s` of all avatars for which `wants` returns true. Before the

@@ -24,8 +24,8 @@ class PoseSink {
   virtual bool OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                       const AvatarReplica& replica) = 0;
 
-  /// Called instead of OnPose if the sink continues the movement. This avoids reading the memory of
-  /// avatars of which nothing has changed.
+  /// Called instead of OnPose while the sink continues the movement of an avatar. The set then does
+  /// not read the replica, which avoids cache misses.
   virtual void OnContinued(protocol::AvatarId) {}
 
   /// Returns the avatars whose movements the sink no longer continues, and forgets them. The set

@@ -58,9 +58,9 @@ struct LoadReport {
 /// Formats a report as readable text.
 [[nodiscard]] std::string ToText(const LoadReport& report);
 
-/// Returns a number of the report by its JSON path, for example "tick_ms.p99". `errors` is the
-/// number of errors. Returns nullopt if the number was not measured. `name` must be one of
-/// ReportNumberNames.
+/// Returns a number of the report. `name` is its path in the JSON report, for example
+/// "tick_ms.p99", and must be one of ReportNumberNames. The path "errors" yields the number of
+/// errors. Returns nullopt if the number was not measured.
 [[nodiscard]] std::optional<double> ReportNumber(const LoadReport& report, std::string_view name);
 /// Returns the names of all numbers.
 [[nodiscard]] std::vector<std::string> ReportNumberNames();

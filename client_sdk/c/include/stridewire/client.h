@@ -474,7 +474,7 @@ stridewire_status stridewire_client_list_layers(stridewire_client* client, strid
                                                 stridewire_layer_name* names, size_t capacity,
                                                 size_t* count);
 
-/// Size of a world's terrain.
+/// Position and size of a world's terrain, without its heights and boxes.
 typedef struct stridewire_terrain {
   double origin_m[2];  ///< World x and z of the first height sample.
   double cell_m;       ///< Distance between neighbouring samples.

@@ -1,7 +1,7 @@
 #ifndef STRIDEWIRE_LIMITS_H
 #define STRIDEWIRE_LIMITS_H
 
-/// Longest name of a world, client, layer or joint, in bytes without the terminating 0.
+/// Maximum length of the name of a world, client, layer or joint, in bytes without the final 0.
 #define STRIDEWIRE_MAX_NAME_BYTES 64
 /// Size of the text in an event, including the terminating 0. Longer texts are truncated.
 #define STRIDEWIRE_MAX_TEXT_BYTES 160
