@@ -353,6 +353,9 @@ void WorldView::Flush(Track& track, std::uint64_t end) {
   for (std::uint64_t i = begin; i < end; ++i) {
     MoveTo(i, ticks, continued.stored);
     const ShardTicks::Tick& tick = ticks.at(i);
+    // After a page was hidden, for example, the displayed poses are no longer stored. Push would
+    // then forget them, so the segment has to change before.
+    if (track.history.IsInterrupted()) track.segment = ++last_segment_;
     track.history.Push({.tick = tick.tick,
                         .time_s = tick.time_s,
                         .segment = track.segment,

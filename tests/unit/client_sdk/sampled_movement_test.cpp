@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <memory>
+#include <utility>
 
 #include "random_requests.h"
 #include "runtime/avatar/movement_record.h"
@@ -181,6 +183,37 @@ TEST_F(SampledMovementTest, DisplaysTheSamePosesAtTicks) {
 TEST_F(SampledMovementTest, KeepsTheSamePosesWithoutBeingSampled) {
   for (int i = 0; i < 200; ++i) Advance();
   ASSERT_NO_FATAL_FAILURE(ExpectSameHistories());
+}
+
+// A page that was hidden displays the crowd as it is now, so poses before and after it belong to
+// different segments.
+TEST_F(SampledMovementTest, ChangesSegmentsIfDisplayedPosesAreNoLongerStored) {
+  const auto newest_segment = [](WorldView& view, protocol::AvatarId avatar) {
+    const PoseHistory* history = view.Find(avatar);
+    return history->stamp(history->size() - 1).segment;
+  };
+  for (const int hidden_ticks : {100, 300, 470}) {
+    for (int i = 0; i < 100; ++i) {
+      Advance();
+      every_tick_.Sample(now_s() - 2.3 * kIntervalS);
+      when_sampled_.Sample(now_s() - 2.3 * kIntervalS);
+    }
+    std::map<std::pair<Viewer*, protocol::AvatarId>, std::uint32_t> before;
+    const auto for_each = [&](const auto& callback) {
+      for (Viewer* viewer : {&every_tick_, &when_sampled_}) {
+        viewer->Sample(now_s() - 2.3 * kIntervalS);
+        for (protocol::AvatarId avatar = 1; avatar <= kAvatars; ++avatar) callback(viewer, avatar);
+      }
+    };
+    for_each([&](Viewer* viewer, protocol::AvatarId avatar) {
+      before[{viewer, avatar}] = newest_segment(viewer->view, avatar);
+    });
+    for (int i = 0; i < hidden_ticks; ++i) Advance();
+    for_each([&](Viewer* viewer, protocol::AvatarId avatar) {
+      EXPECT_NE(newest_segment(viewer->view, avatar), (before[{viewer, avatar}]))
+          << "avatar " << avatar << ", " << hidden_ticks << " ticks";
+    });
+  }
 }
 
 TEST_F(SampledMovementTest, DisplaysTheSamePosesOfSomeTicks) {
