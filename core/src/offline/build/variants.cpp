@@ -7,13 +7,9 @@
 #include "runtime/library/keytimes.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/variant_choice.h"
 
 namespace stridewire {
-namespace {
-
-constexpr std::size_t kMaxVariedParameters = 2;
-
-}  // namespace
 
 std::vector<GridExample> ChooseVariants(const std::vector<GridExample>& found,
                                         std::span<const SelectedExample> used,

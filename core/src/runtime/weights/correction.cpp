@@ -30,10 +30,6 @@ constexpr double kShrinkErrorM = 1e-4;
 // examples do not span all parameters.
 constexpr double kRidge = 1e-9;
 constexpr int kMaxHalvings = 3;
-// Steps vary in pose only in groups with at most this many parameters, that is, if they are
-// straight. Other steps are rarely repeated. Their examples differ so much that soles would enter
-// the ground.
-constexpr std::size_t kMaxVariedParameters = 2;
 // Size of a variation in radians, as measured by PoseChange. Larger variations push toes into the
 // ground in steps of the generated library.
 constexpr double kVariedRad = 0.04;

@@ -1,10 +1,17 @@
 #pragma once
 
+#include <cstddef>
+
 #include "runtime/movement/stride_variation.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
+
+/// Steps vary in pose only in groups with at most this many parameters, that is, if they are
+/// straight. Other steps are rarely repeated. Their examples differ so much that soles would enter
+/// the ground.
+inline constexpr std::size_t kMaxVariedParameters = 2;
 
 /// A variant that a step blends (see MotionGroup).
 struct VariantShare {
