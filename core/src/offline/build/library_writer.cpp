@@ -30,13 +30,17 @@ flatbuffers::Offset<flatbuffers::Vector<T>> AddVector(Builder& builder, std::spa
   return builder.CreateVector(values.data(), values.size());
 }
 
-flatbuffers::Offset<fb::Group> AddGroup(Builder& builder, const MotionGroup& group) {
+flatbuffers::Offset<fb::Group> AddGroup(Builder& builder, const MotionGroup& group,
+                                        const GridLayout& layout) {
   STRIDEWIRE_CHECK(group.sources.size() == static_cast<std::size_t>(group.example_count));
   STRIDEWIRE_CHECK(group.sites.size() ==
                    static_cast<std::size_t>(group.site_count) * group.parameters.size());
   STRIDEWIRE_CHECK(group.variant_parameters.size() ==
                    static_cast<std::size_t>(group.variant_count) * group.parameters.size());
   STRIDEWIRE_CHECK(group.dilations.size() == static_cast<std::size_t>(group.site_count));
+  STRIDEWIRE_CHECK(group.grid.size() == static_cast<std::size_t>(group.grid_point_count) *
+                                            static_cast<std::size_t>(group.row_count()) *
+                                            static_cast<std::size_t>(layout.row_floats));
   std::vector<flatbuffers::Offset<flatbuffers::String>> sources;
   for (const std::string_view source : group.sources) {
     sources.push_back(builder.CreateString(source.data(), source.size()));
@@ -90,7 +94,10 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   }
   Builder builder(size_estimate);
   std::vector<flatbuffers::Offset<fb::Group>> groups;
-  for (const MotionGroup& group : content.groups) groups.push_back(AddGroup(builder, group));
+  const GridLayout layout(content.skeleton.joint_count());
+  for (const MotionGroup& group : content.groups) {
+    groups.push_back(AddGroup(builder, group, layout));
+  }
 
   std::vector<flatbuffers::Offset<fb::Joint>> joints;
   for (const Joint& joint : content.skeleton.joints) {

@@ -128,19 +128,34 @@ TEST_F(Variants, SurviveAFile) {
 }
 
 TEST_F(Variants, OfAFileAreChecked) {
-  const auto fails = [&](std::vector<double> parameters, const char* text) {
+  const std::size_t d = group().parameters.size();
+  // Writes a library whose first group has variants with these parameters, and tables of the size
+  // that the group then needs.
+  const auto fails = [&](const std::vector<double>& parameters, std::size_t omitted_keytimes,
+                         const char* text) {
     std::vector<MotionGroup> groups(library_->groups().begin(), library_->groups().end());
-    groups[0].variant_parameters = parameters;
-    groups[0].variant_count = static_cast<int>(parameters.size() / groups[0].parameters.size());
+    MotionGroup& first = groups[0];
+    first.variant_parameters = parameters;
+    first.variant_count = static_cast<int>(parameters.size() / d);
+    const auto rows = static_cast<std::size_t>(first.row_count());
+    const std::vector<float> grid(rows * static_cast<std::size_t>(first.grid_point_count) *
+                                  static_cast<std::size_t>(library_->layout().row_floats));
+    const std::size_t keys = static_cast<std::size_t>(first.interval_count()) + 1;
+    std::vector<double> keytimes_s(first.keytimes_s.begin(), first.keytimes_s.end());
+    keytimes_s.resize(rows * keys - omitted_keytimes);
+    const std::vector<double> headings_rad(rows);
+    first.grid = grid;
+    first.keytimes_s = keytimes_s;
+    first.heading_change_rad = headings_rad;
     const auto written = WriteLibrary({library_->skeleton(), library_->stand_pose(), groups, {}});
     ASSERT_FALSE(written.has_value());
     EXPECT_EQ(written.error().code, ErrorCode::kMalformed);
     EXPECT_STREQ(written.error().text, text);
   };
-  fails(std::vector<double>(2 * (MotionLibrary::kMaxVariants + 1)),
+  fails(std::vector<double>(d * (MotionLibrary::kMaxVariants + 1)), 0,
         "a group's variant count is out of range");
-  fails({0.0, 0.3, 0.0, HUGE_VAL, 0.0, 0.3, 0.0, 0.3}, "a variant's parameter is out of range");
-  fails({0.0, 0.3}, "a group's time tables have the wrong size");
+  fails({0.0, 0.3, 0.0, HUGE_VAL}, 0, "a variant's parameter is out of range");
+  fails({0.0, 0.3}, 1, "a group's time tables have the wrong size");
 }
 
 TEST_F(Variants, AreBlendedOnlyInVariedSteps) {
