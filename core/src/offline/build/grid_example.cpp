@@ -33,6 +33,14 @@ std::size_t MedoidIndex(const std::vector<GridExample>& examples) {
   return best;
 }
 
+void Flip(float* row, std::size_t joint) {
+  GridLayout::SetRotation(row, joint, -GridLayout::RotationOf(row, joint));
+}
+
+float DotOfRows(const float* a, const float* b, std::size_t joint) {
+  return Dot(GridLayout::RotationOf(a, joint), GridLayout::RotationOf(b, joint));
+}
+
 }  // namespace
 
 void SampleExample(const RawExample& example, double time_s, PoseSpan out) {
@@ -55,11 +63,19 @@ void SampleExample(const RawExample& example, double time_s, PoseSpan out) {
 GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                            const GridLayout& layout, const Quat& stand_root) {
   STRIDEWIRE_CHECK(example.keytimes_s.size() == cells.size() + 1);
-  STRIDEWIRE_CHECK(example.clip.joint_count == layout.joint_count);
   const TimeWarp warp(example.keytimes_s, cells);
-  int point_count = 1;
-  for (const int count : cells) point_count += count;
+  std::vector<double> times_s{warp.TimeAt(0.0)};
+  for (const int count : cells) {
+    for (int i = 0; i < count; ++i) {
+      times_s.push_back(warp.TimeAt(static_cast<double>(times_s.size())));
+    }
+  }
+  return ResampleAt(example, times_s, layout, stand_root);
+}
 
+GridExample ResampleAt(const RawExample& example, std::span<const double> times_s,
+                       const GridLayout& layout, const Quat& stand_root) {
+  STRIDEWIRE_CHECK(example.clip.joint_count == layout.joint_count);
   GridExample result;
   result.keytimes_s = example.keytimes_s;
   result.parameters = example.parameters;
@@ -67,13 +83,13 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
   result.source = example.source;
   result.mirrored = example.mirrored;
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
-  result.rows.assign(static_cast<std::size_t>(point_count) * row_floats, 0.0f);
+  result.rows.assign(times_s.size() * row_floats, 0.0f);
 
   Pose pose(example.clip.joint_count);
   double yaw_rad = 0.0;
-  for (int p = 0; p < point_count; ++p) {
-    SampleExample(example, warp.TimeAt(p), pose);
-    float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
+  for (std::size_t p = 0; p < times_s.size(); ++p) {
+    SampleExample(example, times_s[p], pose);
+    float* row = &result.rows[p * row_floats];
     double wrapped_rad = yaw_rad;
     // If the forward axis of the root is nearly vertical, HeadingOf leaves the previous yaw
     // unchanged.
@@ -97,28 +113,32 @@ void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layo
                       int joint_count) {
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   STRIDEWIRE_CHECK(!examples.empty());
-  GridExample& reference = examples[MedoidIndex(examples)];
-  const std::size_t points = reference.rows.size() / row_floats;
-  const auto flip = [&](float* row, std::size_t j) {
-    GridLayout::SetRotation(row, j, -GridLayout::RotationOf(row, j));
-  };
-  const auto dot = [&](const float* row, const float* to, std::size_t j) {
-    return Dot(GridLayout::RotationOf(row, j), GridLayout::RotationOf(to, j));
-  };
-  for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
-    for (GridExample& example : examples) {
-      for (std::size_t p = 1; p < points; ++p) {
-        float* row = &example.rows[p * row_floats];
-        if (dot(row, row - row_floats, j) < 0.0f) flip(row, j);
+  for (GridExample& example : examples) {
+    for (std::size_t begin = row_floats; begin < example.rows.size(); begin += row_floats) {
+      for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
+        float* row = &example.rows[begin];
+        if (DotOfRows(row, row - row_floats, j) < 0.0f) Flip(row, j);
       }
     }
-    for (GridExample& example : examples) {
-      float along = 0.0f;
-      for (std::size_t p = 0; p < points; ++p) {
-        along += dot(&example.rows[p * row_floats], &reference.rows[p * row_floats], j);
-      }
-      if (along >= 0.0f) continue;
-      for (std::size_t p = 0; p < points; ++p) flip(&example.rows[p * row_floats], j);
+  }
+  const GridExample& reference = examples[MedoidIndex(examples)];
+  for (GridExample& example : examples) {
+    AlignHemisphere(reference, layout, joint_count, example);
+  }
+}
+
+void AlignHemisphere(const GridExample& reference, const GridLayout& layout, int joint_count,
+                     GridExample& example) {
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  STRIDEWIRE_CHECK(example.rows.size() == reference.rows.size());
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
+    float along = 0.0f;
+    for (std::size_t begin = 0; begin < example.rows.size(); begin += row_floats) {
+      along += DotOfRows(&example.rows[begin], &reference.rows[begin], j);
+    }
+    if (along >= 0.0f) continue;
+    for (std::size_t begin = 0; begin < example.rows.size(); begin += row_floats) {
+      Flip(&example.rows[begin], j);
     }
   }
 }

@@ -27,6 +27,10 @@ void SampleExample(const RawExample& example, double time_s, PoseSpan out);
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                                          const GridLayout& layout, const Quat& stand_root);
 
+// Same, but at these times [grid point], in seconds, instead of those of the grid points.
+[[nodiscard]] GridExample ResampleAt(const RawExample& example, std::span<const double> times_s,
+                                     const GridLayout& layout, const Quat& stand_root);
+
 // Makes the quaternions of each joint continuous in sign over time. Then negates whole tracks,
 // where necessary, so that they are in the hemisphere of a reference: the example nearest to the
 // mean parameters. If single points were negated instead, tracks that rotate by 180 degrees away
@@ -34,6 +38,11 @@ void SampleExample(const RawExample& example, double time_s, PoseSpan out);
 // the weights would have the same effect.
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count);
+
+// Negates whole tracks of an example, where necessary, so that they are in the hemisphere of those
+// of `reference`. Both must be continuous in sign.
+void AlignHemisphere(const GridExample& reference, const GridLayout& layout, int joint_count,
+                     GridExample& example);
 
 // Sets `row` to `sum`, a weighted sum of rows, and normalises its rotations. If the rotations of a
 // joint cancel each other out in the sum, `row` keeps its previous rotation of that joint.

@@ -216,18 +216,19 @@ class GroupConverter {
     index_ = static_cast<int>(index);
     const std::vector<int> cells = ChooseCells(group, builder_.grid_fps, layout_, stand_root());
     SelectedSteps selected = SelectExamples(group, cells);
+    std::vector<GridExample> variants;
     if (!selected.variants.empty()) {
       StoredGroup stored(selected.examples, {}, cells, layout_);
       if (Status status = AddView(group, selected.examples, selected.is_smooth, stored); !status) {
         return status;
       }
-      for (GridExample& variant : selected.variants) {
-        AdaptToBlend(views_.back(), layout_, variant);
+      for (const auto& [i, captured] : selected.variants) {
+        variants.push_back(MakeVariant(views_.back(), group.examples[i], captured));
       }
       views_.pop_back();
     }
     StoredGroup& stored = *groups_.emplace_back(
-        std::make_unique<StoredGroup>(selected.examples, selected.variants, cells, layout_));
+        std::make_unique<StoredGroup>(selected.examples, variants, cells, layout_));
     return AddView(group, selected.examples, selected.is_smooth, stored);
   }
 
@@ -247,10 +248,14 @@ class GroupConverter {
     return examples;
   }
 
-  // The examples and variants of a group that are stored.
+  // A captured step that becomes a variant: its index in the raw group, and the step on the grid.
+  struct CapturedStep {
+    std::size_t index = 0;
+    GridExample step;
+  };
   struct SelectedSteps {
-    std::vector<GridExample> examples;
-    std::vector<GridExample> variants;
+    std::vector<GridExample> examples;  // The examples that are stored.
+    std::vector<CapturedStep> variants;
     bool is_smooth = false;  // True if the examples were smoothed over their parameters.
   };
 
@@ -282,16 +287,15 @@ class GroupConverter {
         Note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
       }
       if (IsStep(group.kind)) {
-        steps.variants = ChooseVariants(found, report.examples, units, steps.is_smooth);
-        SmoothNoise(steps);
+        for (const std::size_t i : ChooseVariants(found, report.examples, units, steps.is_smooth)) {
+          steps.variants.push_back({i, found[i]});
+        }
+        SmoothNoise(examples);
       }
     }
     // The toes bend last, so that the selection does not depend on them.
     if (toes_ && selects) {
       for (GridExample& example : examples) toes_->Bend(group.kind, cells, layout_, 0.0, example);
-      for (GridExample& variant : steps.variants) {
-        toes_->Bend(group.kind, cells, layout_, kVariantToeMarginM, variant);
-      }
     }
     STRIDEWIRE_CHECK(report.examples.size() == group.examples.size());
     builder_.selections.push_back(std::move(report));
@@ -314,12 +318,23 @@ class GroupConverter {
     return SmoothExamples(view, layout_, raw_.skeleton, examples);
   }
 
-  void SmoothNoise(SelectedSteps& steps) {
+  // Makes a variant of a group from an example that became `captured` on the grid.
+  GridExample MakeVariant(const MotionGroup& group, const RawExample& example,
+                          const GridExample& captured) const {
+    const std::vector<double> times_s = TimesOfBlend(group, layout_, raw_.skeleton, captured);
+    GridExample variant = ResampleAt(example, times_s, layout_, stand_root());
+    AlignHemisphere(captured, layout_, raw_.skeleton.joint_count(), variant);
+    AdaptToBlend(group, layout_, variant);
+    SmoothJolts(raw_.skeleton, layout_, variant);
+    if (toes_) toes_->Bend(group.kind, group.cells, layout_, kVariantToeMarginM, variant);
+    return variant;
+  }
+
+  void SmoothNoise(std::vector<GridExample>& examples) {
     int smoothed = 0;
-    for (GridExample& example : steps.examples) {
+    for (GridExample& example : examples) {
       smoothed += SmoothJolts(raw_.skeleton, layout_, example) ? 1 : 0;
     }
-    for (GridExample& variant : steps.variants) SmoothJolts(raw_.skeleton, layout_, variant);
     if (smoothed > 0) {
       Note(std::to_string(smoothed) + " examples smoothed where joints jolt");
     }

@@ -32,7 +32,7 @@ double StrideVariation::VariantScore(int variant) const {
 }
 
 double StrideVariation::VariantWeight() const {
-  return 0.5 + 0.5 * FractionOf(Scramble(bits_ + kVariantWeight));
+  return 0.7 + 0.3 * FractionOf(Scramble(bits_ + kVariantWeight));
 }
 
 }  // namespace stridewire

@@ -29,7 +29,7 @@ class StrideVariation {
   /// chooses among them.
   [[nodiscard]] double VariantScore(int variant) const;
 
-  /// Returns the weight of the chosen variant if it fits perfectly, in [0.5, 1).
+  /// Returns the weight of the chosen variant if it fits perfectly, in [0.7, 1).
   [[nodiscard]] double VariantWeight() const;
 
  private:

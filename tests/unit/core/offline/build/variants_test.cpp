@@ -9,6 +9,7 @@
 
 #include "offline/build/library_writer.h"
 #include "runtime/library/keytimes.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
 #include "runtime/weights/variant_choice.h"
@@ -41,9 +42,8 @@ TEST(ChooseVariants, ReturnsTheStepsNearestToTheMedians) {
   }
   const auto variants = ChooseVariants(found, used, kUnits, false);
   ASSERT_EQ(variants.size(), kStoredVariants);
-  EXPECT_EQ(variants[0].parameters[1], 0.5);
-  const std::set<double> next{variants[1].parameters[1], variants[2].parameters[1]};
-  EXPECT_EQ(next, (std::set<double>{0.45, 0.55}));
+  EXPECT_EQ(variants[0], 2u);
+  EXPECT_EQ((std::set<std::size_t>{variants[1], variants[2]}), (std::set<std::size_t>{4, 5}));
 }
 
 TEST(ChooseVariants, ReturnsOnlyStepsThatDifferFromTheExamples) {
@@ -72,7 +72,7 @@ class Variants : public testing::Test {
             step.clip.frame(f).root_position_m.y += static_cast<float>(height_m);
           }
           for (std::size_t k = 1; k + 1 < step.keytimes_s.size(); ++k) {
-            step.keytimes_s[k] *= 1.0 + height_m;
+            step.keytimes_s[k] *= 1.0 + 4.0 * height_m;
           }
           group.examples.push_back(std::move(step));
         }
@@ -116,6 +116,44 @@ TEST_F(Variants, HaveTheKeytimesAndTheSidewaysEndOfTheBlend) {
           1e-6);
     }
   }
+}
+
+// Returns how far the root of a row is ahead of the ball of a foot.
+double RootAheadM(const MotionLibrary& library, std::span<const float> row, Foot foot) {
+  const Pose pose = PoseOfRow(row, library.layout(), library.skeleton().joint_count());
+  return double{pose.root_position_m.z} - double{BallPosition(library.skeleton(), pose, foot).z};
+}
+
+TEST_F(Variants, MoveTheBodyForwardLikeTheBlend) {
+  const auto floats = static_cast<std::size_t>(library_->layout().row_floats);
+  int strides = 0;
+  for (const MotionGroup& group : library_->groups()) {
+    if (group.variant_count == 0) continue;
+    const Foot standing = OtherFoot(MovingFoot(group.kind));
+    const auto rows = static_cast<std::size_t>(group.row_count());
+    std::vector<double> scratch(rows);
+    GridCache cache(library_->layout());
+    Movement movement;
+    for (int v = 0; v < group.variant_count; ++v) {
+      SetWeights(group, 0, group.variant(v), scratch, movement);
+      cache.Clear();
+      const std::size_t own = static_cast<std::size_t>(group.example_count + v);
+      const auto own_m = [&](int p) {
+        const std::size_t row = static_cast<std::size_t>(p) * rows + own;
+        return RootAheadM(*library_, group.grid.subspan(row * floats, floats), standing);
+      };
+      const auto blended_m = [&](int p) {
+        return RootAheadM(*library_, cache.Row(group, movement.weights, p), standing);
+      };
+      const int last = group.grid_point_count - 1;
+      const double scale = (own_m(last) - own_m(0)) / (blended_m(last) - blended_m(0));
+      for (int p = 0; p <= last; ++p) {
+        EXPECT_NEAR(own_m(p) - own_m(0), scale * (blended_m(p) - blended_m(0)), 0.003);
+      }
+      ++strides;
+    }
+  }
+  EXPECT_GT(strides, 0);
 }
 
 TEST_F(Variants, SurviveAFile) {
