@@ -44,6 +44,8 @@ constexpr double kMaxRelativeChange = 3.0;
 // A group of climbing steps has smaller limits on weights if it has fewer captured examples than
 // this per coefficient of the linear part.
 constexpr int kExamplesPerCoefficient = 4;
+// Feet are beside each other if they are at most this far apart in the walking direction.
+constexpr double kBesideM = 0.15;
 // A variation is not used if it leaves an error above this.
 constexpr double kMaxVariedErrorM = 1e-4;
 
@@ -217,6 +219,41 @@ void AddVariation(std::span<const double> change, double size_rad, double max_su
   for (std::size_t e = 0; e < weights.size(); ++e) weights[e] += part * change[e];
 }
 
+// Returns true if a step starts or stops a walk, that is, if the feet are beside each other at its
+// start or at its end.
+bool StartsOrStops(const MotionGroup& group, const ParameterValues& parameters) {
+  for (const ParameterName name : {ParameterName::kStartZ, ParameterName::kEndZ}) {
+    const int l = group.FindParameter(name);
+    if (l >= 0 && std::fabs(parameters.values[static_cast<std::size_t>(l)]) < kBesideM) return true;
+  }
+  return false;
+}
+
+// Writes what a random variation of the weights must not change: rows [row][n] with the values of
+// each example. Returns the number of rows, at most kMaxParameters. `unit` are metres per unit of
+// each parameter.
+std::size_t KeepInVariation(const MotionGroup& group, const ParameterValues& wanted,
+                            const Vector& unit, std::span<double> rows) {
+  const std::size_t d = group.parameters.size();
+  const auto n = static_cast<std::size_t>(group.example_count);
+  for (std::size_t l = 0; l < d; ++l) {
+    for (std::size_t e = 0; e < n; ++e) {
+      rows[l * n + e] = unit[l] * group.site(static_cast<int>(e))[l];
+    }
+  }
+  // Generated examples of starts and stops differ much in their keytimes. In an interval that
+  // became shorter, the body would brake or accelerate harder.
+  const std::size_t intervals = group.cells.size();
+  if (!group.is_completed || !StartsOrStops(group, wanted)) return d;
+  if (d + intervals > kMaxParameters) return d;
+  for (std::size_t k = 0; k < intervals; ++k) {
+    for (std::size_t e = 0; e < n; ++e) {
+      rows[(d + k) * n + e] = group.keytimes_s[e * (intervals + 1) + k + 1];
+    }
+  }
+  return d + intervals;
+}
+
 }  // namespace
 
 CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group) {
@@ -289,12 +326,9 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
   double max_sum = std::max(limits.weight_sum, SumOfMagnitudes(weights));
   const bool is_varied = variation.has_value() && d <= kMaxVariedParameters;
   if (is_varied && group.variant_count == 0) {
-    for (std::size_t l = 0; l < d; ++l) {
-      for (std::size_t e = 0; e < n; ++e) {
-        slopes[l * n + e] = unit[l] * group.site(static_cast<int>(e))[l];
-      }
-    }
-    const WeightStep step(weights, slopes, d, 1.0);
+    const std::size_t kept_count = KeepInVariation(group, wanted, unit, scratch.slopes_);
+    const std::span<const double> kept = std::span(scratch.slopes_).first(kept_count * n);
+    const WeightStep step(weights, kept, kept_count, 1.0);
     if (step.is_solvable()) {
       step.Vary(*variation, next);
       ApplyWeights(group, next, movement);

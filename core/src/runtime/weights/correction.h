@@ -99,8 +99,9 @@ class CorrectionScratch {
 ///   blend for its parameters is added, scaled so that the pose changes by at most a fixed amount.
 ///   The sum of |w| of the examples may then exceed its limit.
 /// - In other groups, the weights deviate at random. The part of the deviation that changes the
-///   parameters is removed to first order, with D as above. The rest is scaled to a fixed change of
-///   the pose, or less if the limits require it.
+///   parameters is removed to first order, with D as above. In generated steps that start or stop
+///   a walk, so is the part that changes the keytimes. The rest is scaled to a fixed change of the
+///   pose, or less if the limits require it.
 ///
 /// If the correction then leaves an error above 0.1 mm, it is repeated without variation.
 ///
