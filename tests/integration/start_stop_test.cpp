@@ -51,7 +51,7 @@ std::shared_ptr<const MotionLibrary> CompletedLibrary(const std::vector<std::str
 TEST_P(StartStop, AcceleratesGently) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const auto library = CompletedLibrary(GetParam().subjects);
-  for (const double length_m : {0.4, 0.6}) {
+  const auto check = [&](const AvatarOptions& options, double length_m) {
     std::vector<MovementRequest> requests;
     for (int walk = 0; walk < 2; ++walk) {
       requests.push_back({1, StandRequest{.seconds = 1.0}});
@@ -60,18 +60,27 @@ TEST_P(StartStop, AcceleratesGently) {
       }
     }
     requests.push_back({3, StandRequest{.seconds = 1.0}});
-    const auto walk = Synthesize({.library = library, .requests = requests, .fps = kFps});
+    const auto walk =
+        Synthesize({.library = library, .requests = requests, .fps = kFps, .options = options});
     ASSERT_TRUE(walk.has_value()) << Describe(walk.error());
     const double largest = LargestAcceleration(walk->clip);
-    std::printf("%s, steps of %.2f m: pelvis acceleration at most %.1f m/s^2\n", GetParam().name,
-                length_m, largest);
-    EXPECT_LT(largest, kMaxAcceleration) << "steps of " << length_m << " m";
+    std::printf("%s, steps of %.2f m, %s %d: pelvis acceleration at most %.1f m/s^2\n",
+                GetParam().name, length_m, options.stride_variation ? "seed" : "not varied",
+                static_cast<int>(options.seed), largest);
+    EXPECT_LT(largest, kMaxAcceleration) << "steps of " << length_m << " m, seed " << options.seed;
+  };
+  for (const double length_m : {0.4, 0.6, 0.75}) {
+    check({}, length_m);
+    for (const std::uint64_t seed : {0u, 1u}) {
+      check({.stride_variation = true, .seed = seed}, length_m);
+    }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Libraries, StartStop,
                          testing::Values(Manner{"Builtin", {}}, Manner{"Subject16", {"16"}},
-                                         Manner{"Subject09", {"09"}}, Manner{"Subject29", {"29"}},
+                                         Manner{"Subject05", {"05"}}, Manner{"Subject09", {"09"}},
+                                         Manner{"Subject29", {"29"}},
                                          Manner{"Subjects03And14", {"03", "14"}}),
                          [](const auto& of) { return std::string(of.param.name); });
 

@@ -11,12 +11,17 @@ namespace stridewire {
 namespace {
 
 // Maximum acceleration of the root due to the blend from the previous pose, unless the blend would
-// then take longer than kMaxApproachS. The movement itself accelerates the root as well. In
-// captures of starts and stops, the root accelerates by 4 to 4.6 m/s^2 in total.
+// then take longer than kMaxApproachS. At the start of the blend, the acceleration of the movement
+// itself is added if it has the opposite direction, and subtracted if it has the same direction.
+// The difference is at least kLeastMaxMPerS2. In captures of starts and stops, the root accelerates
+// by 4 to 4.6 m/s^2 in total.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
+constexpr double kLeastMaxMPerS2 = 1.0;
 constexpr double kMaxApproachS = 0.8;
 // Vertical accelerations have a smaller weight, because climbing legs push the body up.
 constexpr double kVerticalWeight = 0.4;
+// On level ground, a root that rises by at most this much follows the blend.
+constexpr double kMaxLevelRiseM = 0.05;
 // On terrain the blend is shorter, because a climbing or descending leg has less reach to spare.
 constexpr double kMaxTerrainApproachS = 0.35;
 // In strides, the blend is shorter as well. Otherwise, the pelvis would lag behind when it passes
@@ -32,20 +37,22 @@ double WeightedLength(const DVec3& v) {
   return std::max(HorizontalLength(v), kVerticalWeight * std::fabs(v.y));
 }
 
-// Returns the maximum acceleration on the cubic curve that starts at `offset_m` with velocity
-// `offset_m_s` and comes to rest at 0 after `over_s`.
-double PeakAcceleration(const DVec3& offset_m, const DVec3& offset_m_s, double over_s) {
-  const DVec3 bend = 6.0 / (over_s * over_s) * offset_m;
-  const DVec3 slope = 2.0 / over_s * offset_m_s;
-  return std::max(WeightedLength(bend + 2.0 * slope), WeightedLength(bend + slope));
-}
-
 // Returns the shortest time in [least_s, most_s] in which the root can move from `offset_m` with
-// velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2. Bisects the last
-// step of the search, so that a rounding error does not change the result by a whole step.
-double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, double least_s, double most_s) {
+// velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2. `own_m_s2` is the
+// acceleration of the movement itself. Bisects the last step of the search, so that a rounding
+// error does not change the result by a whole step.
+double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, const DVec3& own_m_s2,
+                    double least_s, double most_s) {
   const auto exceeds = [&](double over_s) {
-    return PeakAcceleration(offset_m, offset_m_s, over_s) > kMaxAccelerationMPerS2;
+    // The acceleration on the cubic curve changes linearly from `at_start` to `at_end`.
+    const DVec3 bend = 6.0 / (over_s * over_s) * offset_m;
+    const DVec3 slope = 2.0 / over_s * offset_m_s;
+    const DVec3 at_start = -bend - 2.0 * slope;
+    const DVec3 at_end = bend + slope;
+    const double size = WeightedLength(at_start);
+    const double along = size > 0.0 ? glm::dot(own_m_s2, at_start) / size : 0.0;
+    const double limit = std::max(kMaxAccelerationMPerS2 - along, kLeastMaxMPerS2);
+    return size > limit || WeightedLength(at_end) > kMaxAccelerationMPerS2;
   };
   double too_short_s = least_s;
   if (!exceeds(too_short_s)) return least_s;
@@ -73,6 +80,30 @@ bool IsStride(const FootPlan& plan, double heading_rad) {
                   ahead_m(plan.feet[0].to, plan.feet[1].to)) > kFeetApartForwardM;
 }
 
+// Returns the horizontal acceleration of a movement itself, without the difference pose, which
+// displaces the root by `offset_m` with velocity `offset_m_s` at the start. It is a mean over most
+// of the blend-in. Returns 0 if there are no samples of the blend-in. `above_feet` returns the root
+// relative to the standing feet in a sample.
+template <typename AboveFeet>
+DVec3 OwnAcceleration(const TransitionSamples& samples, const AboveFeet& above_feet,
+                      const DVec3& offset_m, const DVec3& offset_m_s, double ease_out_s) {
+  if (!samples.has_settle_samples()) return DVec3(0.0);
+  const auto& parts = TransitionSamples::kSettleSamples;
+  constexpr std::size_t kMiddle = 2;
+  constexpr std::size_t kEnd = 6;
+  static_assert(parts[kEnd] == 2.0 * parts[kMiddle]);
+  const auto without_difference = [&](std::size_t k) {
+    return above_feet(TransitionSamples::kSettle + k) - EaseOut(parts[k]) * offset_m -
+           ease_out_s * EaseOutSlope(parts[k]) * offset_m_s;
+  };
+  const double step_s = parts[kMiddle] * ease_out_s;
+  DVec3 own_m_s2 = (above_feet(samples.blended_start()) - 2.0 * without_difference(kMiddle) +
+                    without_difference(kEnd)) /
+                   (step_s * step_s);
+  own_m_s2.y = 0.0;
+  return own_m_s2;
+}
+
 }  // namespace
 
 void PlanRootApproach(const FootPlanJob& job) {
@@ -91,9 +122,11 @@ void PlanRootApproach(const FootPlanJob& job) {
     }
     return root;
   };
-  // On terrain, the approach includes the height if the root has to rise. Otherwise, the legs of an
-  // avatar that has climbed would straighten while the difference pose fades out.
-  const bool rises = plan.keeps_above_ground && above_feet(eased).y < above_feet(blended).y;
+  // The approach includes the height if the root has to rise, on level ground only if it has to
+  // rise far. Otherwise, the legs of an avatar that has climbed, or that rises from a crouch, would
+  // straighten while the difference pose fades out.
+  const double rise_m = above_feet(blended).y - above_feet(eased).y;
+  const bool rises = rise_m > (plan.keeps_above_ground ? 0.0 : kMaxLevelRiseM);
   const auto offset_at = [&](std::size_t i) {
     DVec3 offset = above_feet(eased + i) - above_feet(blended + i);
     if (!rises) offset.y = 0.0;
@@ -106,6 +139,7 @@ void PlanRootApproach(const FootPlanJob& job) {
     const double part = samples.start_step_s() / ease_out_s;
     offset_m_s = (next_m - EaseOut(part) * offset_m) / (ease_out_s * EaseOutSlope(part));
   }
+  const DVec3 own_m_s2 = OwnAcceleration(samples, above_feet, offset_m, offset_m_s, ease_out_s);
   const double longest_s = plan.keeps_above_ground                     ? kMaxTerrainApproachS
                            : IsStride(plan, movement.base.heading_rad) ? kMaxStrideApproachS
                                                                        : kMaxApproachS;
@@ -118,7 +152,7 @@ void PlanRootApproach(const FootPlanJob& job) {
   plan.root_approach = {.offset_m = offset_m,
                         .offset_m_s = offset_m_s,
                         .over_s = ApproachTime(offset_m + residual_m, offset_m_s + residual_m_s,
-                                               ease_out_s, std::max(ease_out_s, most_s))};
+                                               own_m_s2, ease_out_s, std::max(ease_out_s, most_s))};
 }
 
 }  // namespace stridewire

@@ -41,6 +41,8 @@ class TransitionSamples {
   /// Returns the index of the start of the movement without its difference pose. The next sample is
   /// start_step_s() later.
   [[nodiscard]] std::size_t blended_start() const { return blended_start_; }
+  /// Returns true if the samples of the blend-in exist.
+  [[nodiscard]] bool has_settle_samples() const { return blended_start_ > kSettle; }
   [[nodiscard]] double start_step_s() const { return start_step_s_; }
 
  private:
