@@ -122,14 +122,10 @@ export class WorldPanes {
     void subscription.reply.then(({ok, status, text}) => {
       if (pane.subscription !== subscription) return;
       pane.subscribed = ok;
-      if (ok || !['unsupported', 'version_mismatch', 'malformed'].includes(status)) return;
-      if (mode === 'movement') {
-        this.setPoseStream({...this.stream, mode: 'quantised'});
-        this.host.onMovementModeFailed(text);
-      } else {
-        // The URL may request a detail that an older server does not support.
-        this.setPoseStream({...this.stream, detail: 'all'});
-      }
+      if (ok || mode !== 'movement') return;
+      if (!['unsupported', 'version_mismatch', 'malformed'].includes(status)) return;
+      this.setPoseStream({...this.stream, mode: 'quantised'});
+      this.host.onMovementModeFailed(text);
     });
   }
 
