@@ -153,7 +153,7 @@ Status Terrain::IndexBoxes() {
   for (std::size_t c = 0; c + 1 < starts_.size(); ++c) {
     static_assert(kMaxTerrainBoxesPerCell == 256);
     if (starts_[c + 1] - starts_[c] > kMaxTerrainBoxesPerCell) {
-      return Fail(ErrorCode::kLimitExceeded, "more than 256 boxes overlap in one place",
+      return Fail(ErrorCode::kLimitExceeded, "more than 256 boxes overlap or are close together",
                   std::string("boxes"), static_cast<std::int64_t>(boxes_[starts_[c]]));
     }
   }
