@@ -150,8 +150,8 @@ namespace Stridewire
         /// <summary>Uses world. The skeleton is available. Repeated after SESSION_LOST.</summary>
         WorldJoined = 5,
         /// <summary>Uses world, command, status, accepted, text. The status is OK only if the
-        /// server has executed all items. If the server has refused only items, it is the status of
-        /// the first refused item.</summary>
+        /// server has executed all items. If the server has accepted the command but refused some
+        /// of its items, the status is that of the first refused item.</summary>
         Reply = 6,
         /// <summary>Uses world, command, item_index, avatar, request_id, status, text. Reports an
         /// item that the server refused, or the id that it chose for a spawned avatar. Precedes the

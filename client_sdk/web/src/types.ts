@@ -358,8 +358,8 @@ export interface World {
   on<K extends keyof WorldListeners>(name: K, listener: WorldListeners[K]): () => void;
 
   /**
-   * Returns the ids of the avatars whose poses the client receives, ascending. A change replaces
-   * the array.
+   * Returns the ids of the avatars whose poses the client receives, in ascending order. When the
+   * set changes, the next call returns a new array.
    */
   avatars(): Uint32Array;
   /** Computes the pose of an avatar at a server time, usually `Client.renderTimeS()`. */

@@ -15,7 +15,8 @@ using boost::system::error_code;
 
 constexpr std::size_t kReadBufferBytes = std::size_t{32} << 10;
 constexpr std::size_t kWriteBytes = std::size_t{256} << 10;
-// If nothing is received, pings are sent in intervals of the idle timeout divided by this.
+// A WebSocket connection that receives nothing sends pings at intervals of the idle timeout divided
+// by this.
 constexpr double kPingsPerIdleTimeout = 3.0;
 
 }  // namespace

@@ -56,7 +56,8 @@ class MovementFeed {
   std::shared_ptr<World> world_;
   bool covers_all_ = false;
   std::vector<AvatarId> selected_;  // ascending
-  // Ascending ids that have not been reported to the client as gone yet.
+  // Ascending ids of avatars that are no longer selected, but have not yet been reported to the
+  // client as gone.
   std::vector<AvatarId> deselected_;
   // Ascending ids whose states are needed; null: all avatars.
   std::shared_ptr<const std::vector<AvatarId>> states_of_;

@@ -22,7 +22,7 @@ namespace stridewire::server {
                                                      std::span<const std::uint32_t> picked,
                                                      bool is_partial, ThreadMetrics& metrics);
 
-/// Reuses the memory of PoseRows that other threads read. One thread calls Take and Share.
+/// Reuses the memory of PoseRows that other threads read. Only one thread may call Take and Share.
 class RowsPool {
  public:
   /// Returns rows to fill. They belong to the caller until the next call.

@@ -106,8 +106,8 @@ struct LibraryBuilder {
     int group = 0;
     std::string text;
   };
-  /// Output of Build: notes on merged duplicates, and on parameter directions in which no example
-  /// varies.
+  /// Output of Build: notes on examples that were averaged, dropped or smoothed, and on parameters
+  /// that are equal in all examples.
   std::vector<Note> notes;
   std::vector<GroupSelection> selections;  ///< Output of Build, one per group.
 

@@ -27,7 +27,7 @@ void SampleExample(const RawExample& example, double time_s, PoseSpan out);
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                                          const GridLayout& layout, const Quat& stand_root);
 
-// Same, but at these times [grid point], in seconds, instead of those of the grid points.
+// Same, but samples the example at `times_s` [grid point].
 [[nodiscard]] GridExample ResampleAt(const RawExample& example, std::span<const double> times_s,
                                      const GridLayout& layout, const Quat& stand_root);
 
@@ -39,8 +39,8 @@ void SampleExample(const RawExample& example, double time_s, PoseSpan out);
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count);
 
-// Negates whole tracks of an example, where necessary, so that they are in the hemisphere of those
-// of `reference`. Both must be continuous in sign.
+// Negates whole tracks of an example, where necessary, so that they are in the same hemisphere as
+// those of `reference`. The tracks of both must be continuous in sign.
 void AlignHemisphere(const GridExample& reference, const GridLayout& layout, int joint_count,
                      GridExample& example);
 

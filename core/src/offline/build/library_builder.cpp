@@ -318,7 +318,7 @@ class GroupConverter {
     return SmoothExamples(view, layout_, raw_.skeleton, examples);
   }
 
-  // Makes a variant of a group from an example that became `captured` on the grid.
+  // Creates a variant of a group from an example. `captured` is this example resampled on the grid.
   GridExample MakeVariant(const MotionGroup& group, const RawExample& example,
                           const GridExample& captured) const {
     const std::vector<double> times_s = TimesOfBlend(group, layout_, raw_.skeleton, captured);

@@ -44,7 +44,7 @@ std::vector<std::size_t> ChooseVariants(const std::vector<GridExample>& found,
 
 namespace {
 
-// Sets the weights of a movement to those that the group blends for these parameters.
+// Sets the weights of a movement to those of the group's blend for these parameters.
 void BlendFor(std::span<const double> parameters, const MotionGroup& group, Movement& movement) {
   std::vector<double> scratch(static_cast<std::size_t>(group.example_count));
   SetWeights(group, -1, parameters, scratch, movement);

@@ -18,10 +18,10 @@ inline constexpr std::size_t kStoredVariants = 4;
 // parameters to another blend, in which the toes may be lower at the same time.
 inline constexpr double kVariantToeMarginM = 0.015;
 
-// Returns the captured steps that become variants of a group (see MotionGroup), as indices of
-// `found`. They are at most kStoredVariants: those whose parameters are nearest to the medians over
-// all steps. `found` are the captured steps with aligned hemispheres, and `used` [found] is how the
-// builder used them. `units` are metres per unit of each parameter.
+// Returns the indices in `found` of the captured steps that become variants of a group (see
+// MotionGroup): the steps whose parameters are nearest to the medians over all steps, at most
+// kStoredVariants. `found` contains the captured steps with aligned hemispheres, and `used` [found]
+// describes how the builder used them. `units` contains metres per unit of each parameter.
 //
 // Outliers are never variants. If the examples are not smooth, steps that are stored unchanged are
 // not variants either, because the library already blends them for their parameters. Only groups
@@ -32,12 +32,13 @@ inline constexpr double kVariantToeMarginM = 0.015;
                                                       std::span<const double> units,
                                                       bool is_smooth);
 
-// Returns the times of a captured step, in seconds, that correspond to the grid points of what the
-// group blends for its parameters: those at which its root has covered the same fraction of its way
-// past the standing foot. A variant that is resampled at these times moves the body forward like
-// the blend. At other times, it would change the speed of the body, and each join with another step
-// would have to brake or accelerate it. Returns the times of the step's own grid points if a root
-// does not always move forward. `group` must have weights.
+// Returns one time per grid point, in seconds, at which to sample a captured step so that it moves
+// forward like the blend for its parameters: the time at which the root of the step has covered the
+// same fraction of its path past the standing foot as the root of the blend has covered at the grid
+// point. Otherwise, a variant would change the speed of the body, and each transition to another
+// step would have to brake or accelerate the body. If the root of the step or of the blend does not
+// move forward throughout, returns the times of the step's own grid points. `group` must have
+// weights.
 [[nodiscard]] std::vector<double> TimesOfBlend(const MotionGroup& group, const GridLayout& layout,
                                                const Skeleton& skeleton,
                                                const GridExample& captured);

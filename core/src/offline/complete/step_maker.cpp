@@ -566,7 +566,8 @@ class StepGenerator {
   StepFeet feet_;
   double start_share_ = 0.0;
   double end_share_ = 0.0;
-  // 1 in steps that start and end in a stride, 0 in steps that start or end in a stand.
+  // 0 in steps that start or end in a stand. Increases to 1 for steps that start and end in at
+  // least half of the captured stride.
   double in_stride_ = 0.0;
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;

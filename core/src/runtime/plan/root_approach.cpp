@@ -11,16 +11,16 @@ namespace stridewire {
 namespace {
 
 // Maximum acceleration of the root due to the blend from the previous pose, unless the blend would
-// then take longer than kMaxApproachS. At the start of the blend, the acceleration of the movement
-// itself is added if it has the opposite direction, and subtracted if it has the same direction.
-// The difference is at least kLeastMaxMPerS2. In captures of starts and stops, the root accelerates
-// by 4 to 4.6 m/s^2 in total.
+// then take longer than kMaxApproachS. At the start of the blend, this limit is reduced by the
+// component of the movement's own acceleration in the direction of the blend's acceleration. It is
+// thus higher if the two oppose each other, and never lower than kLeastMaxMPerS2. In captures of
+// starts and stops, the root accelerates by 4 to 4.6 m/s^2 in total.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
 constexpr double kLeastMaxMPerS2 = 1.0;
 constexpr double kMaxApproachS = 0.8;
 // Vertical accelerations have a smaller weight, because climbing legs push the body up.
 constexpr double kVerticalWeight = 0.4;
-// On level ground, a root that rises by at most this much follows the blend.
+// On level ground, the approach includes the height only if the root rises by more than this.
 constexpr double kMaxLevelRiseM = 0.05;
 // On terrain the blend is shorter, because a climbing or descending leg has less reach to spare.
 constexpr double kMaxTerrainApproachS = 0.35;
@@ -38,9 +38,10 @@ double WeightedLength(const DVec3& v) {
 }
 
 // Returns the shortest time in [least_s, most_s] in which the root can move from `offset_m` with
-// velocity `offset_m_s` to rest at 0 without exceeding kMaxAccelerationMPerS2. `own_m_s2` is the
-// acceleration of the movement itself. Bisects the last step of the search, so that a rounding
-// error does not change the result by a whole step.
+// velocity `offset_m_s` to rest at 0 within the limit on its acceleration
+// (kMaxAccelerationMPerS2), or `most_s` if there is none. `own_m_s2` is the acceleration of the
+// movement itself. Bisects the last step of the search, so that a rounding error does not change
+// the result by a whole step.
 double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, const DVec3& own_m_s2,
                     double least_s, double most_s) {
   const auto exceeds = [&](double over_s) {
@@ -80,10 +81,11 @@ bool IsStride(const FootPlan& plan, double heading_rad) {
                   ahead_m(plan.feet[0].to, plan.feet[1].to)) > kFeetApartForwardM;
 }
 
-// Returns the horizontal acceleration of a movement itself, without the difference pose, which
-// displaces the root by `offset_m` with velocity `offset_m_s` at the start. It is a mean over most
-// of the blend-in. Returns 0 if there are no samples of the blend-in. `above_feet` returns the root
-// relative to the standing feet in a sample.
+// Returns the horizontal acceleration of the root in a movement without its difference pose, as a
+// mean over the first 80 % of the blend-in. Returns 0 if there are no samples of the blend-in.
+// `offset_m` and `offset_m_s` are the offset and the velocity that the difference pose adds to the
+// root at the start. `above_feet` returns the position of the root relative to the standing feet
+// in a sample.
 template <typename AboveFeet>
 DVec3 OwnAcceleration(const TransitionSamples& samples, const AboveFeet& above_feet,
                       const DVec3& offset_m, const DVec3& offset_m_s, double ease_out_s) {
@@ -122,9 +124,9 @@ void PlanRootApproach(const FootPlanJob& job) {
     }
     return root;
   };
-  // The approach includes the height if the root has to rise, on level ground only if it has to
-  // rise far. Otherwise, the legs of an avatar that has climbed, or that rises from a crouch, would
-  // straighten while the difference pose fades out.
+  // The approach includes the height if the root has to rise (on level ground, by more than
+  // kMaxLevelRiseM). Otherwise, the legs of an avatar that has climbed or that rises from a crouch
+  // would straighten within the short time in which the difference pose fades out.
   const double rise_m = above_feet(blended).y - above_feet(eased).y;
   const bool rises = rise_m > (plan.keeps_above_ground ? 0.0 : kMaxLevelRiseM);
   const auto offset_at = [&](std::size_t i) {

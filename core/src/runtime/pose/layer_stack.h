@@ -64,7 +64,7 @@ class LayerStack {
   [[nodiscard]] bool empty() const { return playing_.empty(); }
 
   /// Replaces the layers with those of another stack of the same library. Fails with kOutOfRange
-  /// and changes nothing if the state is invalid.
+  /// and changes nothing if `playing` is invalid.
   [[nodiscard]] Status Restore(const MotionLibrary& library, std::span<const Playing> playing);
 
  private:

@@ -66,7 +66,7 @@ struct FeetCorrection {
   /// Shift of the root, before it is lowered for legs that are too short.
   DVec3 root_m = DVec3(0.0);
 };
-/// Returns the corrections at `time_s`. `blended` are the feet at that time.
+/// Returns the corrections at `time_s`. `blended` contains the blended feet at that time.
 [[nodiscard]] FeetCorrection CorrectFeet(const Movement& movement, double time_s,
                                          const FeetAt& blended);
 /// Same, for the feet of the blended pose `pose`.

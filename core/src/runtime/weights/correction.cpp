@@ -229,9 +229,10 @@ bool StartsOrStops(const MotionGroup& group, const ParameterValues& parameters) 
   return false;
 }
 
-// Writes what a random variation of the weights must not change: rows [row][n] with the values of
-// each example. Returns the number of rows, at most kMaxParameters. `unit` are metres per unit of
-// each parameter.
+// Writes the quantities that a random variation of the weights must not change to `rows`
+// [row][n], with the value of each example: the parameters and, in generated steps that start or
+// stop a walk, the keytimes if there is room. Returns the number of rows, at most kMaxParameters.
+// `unit` contains metres per unit of each parameter.
 std::size_t KeepInVariation(const MotionGroup& group, const ParameterValues& wanted,
                             const Vector& unit, std::span<double> rows) {
   const std::size_t d = group.parameters.size();
@@ -241,8 +242,8 @@ std::size_t KeepInVariation(const MotionGroup& group, const ParameterValues& wan
       rows[l * n + e] = unit[l] * group.site(static_cast<int>(e))[l];
     }
   }
-  // Generated examples of starts and stops differ much in their keytimes. In an interval that
-  // became shorter, the body would brake or accelerate harder.
+  // The keytimes of generated starts and stops differ considerably. If a variation shortened an
+  // interval, the body would brake or accelerate harder in it.
   const std::size_t intervals = group.cells.size();
   if (!group.is_completed || !StartsOrStops(group, wanted)) return d;
   if (d + intervals > kMaxParameters) return d;

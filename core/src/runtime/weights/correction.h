@@ -100,8 +100,8 @@ class CorrectionScratch {
 ///   The sum of |w| of the examples may then exceed its limit.
 /// - In other groups, the weights deviate at random. The part of the deviation that changes the
 ///   parameters is removed to first order, with D as above. In generated steps that start or stop
-///   a walk, so is the part that changes the keytimes. The rest is scaled to a fixed change of the
-///   pose, or less if the limits require it.
+///   a walk, the part that changes the keytimes is removed as well. The rest is scaled to a fixed
+///   change of the pose, or less if the limits require it.
 ///
 /// If the correction then leaves an error above 0.1 mm, it is repeated without variation.
 ///

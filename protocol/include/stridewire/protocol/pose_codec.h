@@ -50,7 +50,8 @@ enum class PoseDetail : std::uint8_t {
 }
 
 /// Steps per metre of a quantised root position. A step is 2^-14 m (0.061 mm), so a coordinate
-/// changes by at most 2^-15 m (0.031 mm). From 512 m on, every float32 is a whole step.
+/// changes by at most 2^-15 m (0.031 mm). From 512 m on, every float32 is a multiple of a step, so
+/// it does not change.
 inline constexpr float kRootStepsPerM = 16384.0f;
 /// Largest coordinate of a quantised root position in metres.
 inline constexpr float kMaxRootM = 131'071.0f;
