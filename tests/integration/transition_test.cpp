@@ -308,6 +308,42 @@ TEST(TransitionPath, UsesAnotherGroupIfTheBestOneCannotFollow) {
 }
 
 // Without a table, only the positions of the feet matter.
+// Captured steps in a crouch, and generated upright steps with the same parameters.
+TEST(TransitionPath, WalksPreferGroupsThatFitThePreviousMovement) {
+  RawLibrary raw = MakeTestRawLibrary();
+  std::vector<RawGroup> upright;
+  for (RawGroup& group : raw.groups) {
+    if (!IsStep(group.kind)) continue;
+    RawGroup& generated = upright.emplace_back(group);
+    generated.is_completed = true;
+    for (RawExample& step : generated.examples) step.source = "completed step";
+    for (RawExample& step : group.examples) {
+      for (int f = 0; f < step.clip.frame_count(); ++f) {
+        step.clip.frame(f).root_position_m.y -= 0.4f;
+      }
+    }
+  }
+  const std::size_t captured_right = kRight;
+  const std::size_t generated_right = raw.groups.size() + 1;
+  raw.groups.insert(raw.groups.end(), upright.begin(), upright.end());
+  const auto library = LibraryBuilder().Build(raw).value();
+  ASSERT_TRUE(library->groups()[generated_right].is_completed);
+
+  // The right foot is behind, and a walk continues straight ahead.
+  const DVec3 left_m(0.1, 0.0, 0.4);
+  const FootState feet{left_m - DVec3(-0.1, 0.0, 0.0)};
+  const auto group_for = [&](const FootprintOrigin& origin) {
+    const Footprint print{DVec3(-0.1, 0.0, 0.8), 0.0};
+    const auto plan = PlanFootprint(*library, Foot::kRight, print, left_m, 0.0, feet, origin);
+    return static_cast<std::size_t>(plan.value().group);
+  };
+  const std::size_t captured_left = kLeft;
+  const std::size_t generated_left = generated_right - 1;
+  EXPECT_EQ(group_for({.is_walk = true, .after = captured_left}), captured_right);
+  EXPECT_EQ(group_for({.is_walk = true, .after = generated_left}), generated_right);
+  EXPECT_EQ(group_for({}), captured_right);
+}
+
 TEST(TransitionPath, UsesFootPositionsWithoutATable) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   const auto older = Older(*strides);

@@ -351,6 +351,7 @@ WalkDecision AvatarSimulation::PlanNextWalkStep(WalkProgress& progress) const {
   stance.heading_rad = base_.heading_rad;
   stance.last_moved = last_moved_;
   stance.vector = feet_;
+  stance.last_group = last_group_;
   stance.last_step_s = is_walking_ ? body_.movement.duration_s() : 0.0;
   stance.is_exact = body_.plants_feet;
   stance.is_aimed = progress.is_aimed;
@@ -457,7 +458,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
     foot = side_m >= 0.0 ? Foot::kLeft : Foot::kRight;
   }
   auto plan = PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
-                            base_.heading_rad, feet_, FootprintUse::kRequested);
+                            base_.heading_rad, feet_, FootprintOrigin{});
   // The whole pose determines whether a leg reaches a footprint exactly, so a step with exact
   // placement must not be varied.
   if (plan) plan->is_varied = !step.exact_only;

@@ -78,6 +78,19 @@ constexpr double kChangeM = 1e-6;
 constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
 
+// In walks of libraries with generated groups, a group costs kTransitionWeight per metre by which
+// its transition distance from the previous movement exceeds kFreeTransitionM. Otherwise, if the
+// captured steps of a library are crouched and its generated steps upright, the body would rise and
+// fall from step to step.
+constexpr double kTransitionWeight = 0.5;
+constexpr double kFreeTransitionM = 0.2;
+
+// The movement before a step.
+struct Previous {
+  std::size_t group = 0;  // The number of groups after a stand.
+  bool must_fit = false;  // True if only groups that may follow it (MayFollow) are considered.
+};
+
 // Goal for one parameter. If `given` is false, the request does not specify it, and any value
 // within the range of the examples is acceptable.
 struct ParameterGoal {
@@ -226,19 +239,30 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   return plan;
 }
 
+// Returns the additional cost of a group in a walk after another group.
+double TransitionCost(const MotionLibrary& library, std::size_t from, std::size_t to) {
+  const Transition* transition = library.FindTransition(from, to);
+  if (transition == nullptr) return 0.0;
+  return kTransitionWeight * std::max(0.0, double{transition->distance_m} - kFreeTransitionM);
+}
+
 std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind kind,
                                     const ParameterGoals& goals, double stand_side_m,
-                                    bool is_straight, std::optional<std::size_t> after) {
+                                    bool is_straight, const std::optional<Previous>& previous) {
   std::optional<RequestPlan> best;
   double best_cost_m = HUGE_VAL;
   const bool is_completed_library =
       IsStep(kind) && std::ranges::any_of(library.groups(), &MotionGroup::is_completed);
   for (std::size_t g = 0; g < library.groups().size(); ++g) {
     const MotionGroup& group = library.groups()[g];
-    if (group.kind != kind || (after && !MayFollow(library, *after, g))) continue;
+    if (group.kind != kind) continue;
+    if (previous && previous->must_fit && !MayFollow(library, previous->group, g)) continue;
     double group_cost_m = kCostPerParameterM * group.parameter_count();
     if (is_straight && IsGeneral(group)) group_cost_m += kStraightPreferenceM;
     if (group.is_completed) group_cost_m += kCompletedCostM;
+    if (previous && !previous->must_fit && is_completed_library) {
+      group_cost_m += TransitionCost(library, previous->group, g);
+    }
     const auto plan = PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m,
                                   best_cost_m - kTieM, is_completed_library);
     if (!plan) continue;
@@ -267,7 +291,7 @@ double HorizontalMissM(const MotionGroup& group, const RequestPlan& plan) {
 std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary& library,
                                         const StepRequest& request, const FootState& feet,
                                         Foot last_moved, bool standing,
-                                        std::optional<std::size_t> after) {
+                                        const std::optional<Previous>& previous) {
   const FootState stand{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)};
   const auto plan_foot = [&](Foot foot) {
     const DVec3 start = feet.Vector(foot);
@@ -290,7 +314,8 @@ std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary
                                        : request.turn_rad == 0.0 ? kStraightMetresPerRadian
                                                                  : kMetresPerRadian};
     const bool is_straight = request.turn_rad == 0.0 && request.height_m == 0.0 && !request.side_m;
-    auto plan = BestPlan(library, StepKind(foot), goals, stand.Vector(foot).x, is_straight, after);
+    auto plan =
+        BestPlan(library, StepKind(foot), goals, stand.Vector(foot).x, is_straight, previous);
     if (plan) {
       plan->is_side_given = request.side_m.has_value();
       plan->turn_rad = request.turn_rad;
@@ -315,7 +340,9 @@ std::optional<RequestPlan> PlanStepWith(double climb_weight, const MotionLibrary
 std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequest& request,
                                     const FootState& feet, Foot last_moved, bool standing,
                                     std::optional<std::size_t> after) {
-  return PlanStepWith(kHeightWeight, library, request, feet, last_moved, standing, after);
+  std::optional<Previous> previous;
+  if (after) previous = Previous{.group = *after, .must_fit = true};
+  return PlanStepWith(kHeightWeight, library, request, feet, last_moved, standing, previous);
 }
 
 bool MayFollow(const MotionLibrary& library, std::size_t from, std::size_t to) {
@@ -330,7 +357,7 @@ bool MayFollow(const MotionLibrary& library, std::size_t from, std::size_t to) {
 std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
                                          const Footprint& print, const DVec3& fixed_m,
                                          double heading_rad, const FootState& feet,
-                                         FootprintUse use) {
+                                         const FootprintOrigin& origin) {
   const DVec3 vector = RotateYaw(-print.heading_rad, print.position_m - fixed_m);
   StepRequest step;
   step.foot = foot;
@@ -339,8 +366,11 @@ std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot
   step.side_m = foot == Foot::kLeft ? vector.x : -vector.x;
   step.height_m = GroundRise(vector.y);
   step.turn_rad = print.heading_rad - heading_rad;
-  std::optional<RequestPlan> plan = PlanStep(library, step, feet, OtherFoot(foot), false);
-  if (plan && use == FootprintUse::kRequested &&
+  std::optional<Previous> previous;
+  if (origin.after) previous = Previous{.group = *origin.after, .must_fit = false};
+  std::optional<RequestPlan> plan =
+      PlanStepWith(kHeightWeight, library, step, feet, OtherFoot(foot), false, previous);
+  if (plan && !origin.is_walk &&
       HorizontalMissM(library.group(plan->group), *plan) > kMaxClimbMissM) {
     plan = PlanStepWith(kClimbWeight, library, step, feet, OtherFoot(foot), false, std::nullopt);
   }

@@ -110,7 +110,12 @@ inline constexpr double kMaxPlantedErrorM = 0.6;
 [[nodiscard]] bool MayFollow(const MotionLibrary& library, std::size_t from, std::size_t to);
 
 /// Origin of a footprint. A walk can choose another footprint if no step fits; a request cannot.
-enum class FootprintUse { kRequested, kWalk };
+struct FootprintOrigin {
+  bool is_walk = false;
+  /// In a walk: the group of the previous movement, or the number of groups after a stand. Groups
+  /// whose movements start in a pose far from its end cost more (MotionLibrary::FindTransition).
+  std::optional<std::size_t> after;
+};
 
 /// Plans a step to a footprint in world space, by converting it to a request relative to the
 /// staying foot, which is at `fixed_m`. `print.heading_rad` must be unwrapped to be close to
@@ -118,7 +123,7 @@ enum class FootprintUse { kRequested, kWalk };
 [[nodiscard]] std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
                                                        const Footprint& print, const DVec3& fixed_m,
                                                        double heading_rad, const FootState& feet,
-                                                       FootprintUse use);
+                                                       const FootprintOrigin& origin);
 
 /// Plans a jump.
 [[nodiscard]] std::optional<RequestPlan> PlanJump(const MotionLibrary& library,

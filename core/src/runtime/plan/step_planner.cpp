@@ -293,7 +293,7 @@ bool StepPlanner::IsGood(const Footprint& print) {
 std::optional<PlannedStep> StepPlanner::PlanExactStep(const Footprint& print,
                                                       const WalkStep& step) const {
   auto plan = PlanFootprint(library_, moving_, print, fixed_m_, stance_.heading_rad, stance_.vector,
-                            FootprintUse::kWalk);
+                            {.is_walk = true, .after = stance_.last_group});
   if (!plan) return std::nullopt;
   const MotionGroup& group = library_.group(plan->group);
   const DVec3 wanted = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);

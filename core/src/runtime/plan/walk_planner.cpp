@@ -83,6 +83,7 @@ WalkStance After(const WalkStance& stance, const PlannedStep& step) {
   after.vector.left_from_right_m =
       RotateYaw(-step.heading_rad, after.feet[0].position_m - after.feet[1].position_m);
   after.last_step_s = kExpectedStepS;
+  after.last_group = static_cast<std::size_t>(step.plan.group);
   after.is_aimed[static_cast<std::size_t>(step.moved)] = step.is_last;
   return after;
 }

@@ -19,6 +19,8 @@ struct WalkStance {
   Foot last_moved = Foot::kRight;
   FootState vector;          ///< Relative position of the feet, for PlanStep.
   double last_step_s = 0.0;  ///< Duration of the previous step. 0 if the avatar is not walking.
+  /// FootprintOrigin::after.
+  std::optional<std::size_t> last_group;
   /// True if feet land exactly on their footprints. False without foot planting.
   bool is_exact = true;
   /// [foot]: true if the last step of this foot in the current walk was aimed at its footprint at
