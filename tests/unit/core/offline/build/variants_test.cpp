@@ -137,7 +137,8 @@ TEST_F(Variants, MoveTheBodyForwardLikeTheBlend) {
     for (int v = 0; v < group.variant_count; ++v) {
       SetWeights(group, 0, group.variant(v), scratch, movement);
       cache.Clear();
-      const std::size_t own = static_cast<std::size_t>(group.example_count + v);
+      const std::size_t own =
+          static_cast<std::size_t>(group.example_count) + static_cast<std::size_t>(v);
       const auto own_m = [&](int p) {
         const std::size_t row = static_cast<std::size_t>(p) * rows + own;
         return RootAheadM(*library_, group.grid.subspan(row * floats, floats), standing);
