@@ -113,7 +113,8 @@ inline constexpr double kMaxPlantedErrorM = 0.6;
 struct FootprintOrigin {
   bool is_walk = false;
   /// In a walk: the group of the previous movement, or the number of groups after a stand. Groups
-  /// whose movements start in a pose far from its end cost more (MotionLibrary::FindTransition).
+  /// whose movements start in a pose far from the end of the previous one cost more
+  /// (MotionLibrary::FindTransition).
   std::optional<std::size_t> after;
 };
 

@@ -73,7 +73,7 @@ class CorrectionScratch {
   std::vector<double> weights_;  // [example]
   std::vector<double> next_;     // [example]
   std::vector<double> halved_;   // [example]
-  std::vector<double> slopes_;   // [parameter][example]
+  std::vector<double> slopes_;   // [parameter, or row of KeepInVariation][example]
 };
 
 /// Sets the parameters and weights of a movement so that its measured parameters are p^, given by
