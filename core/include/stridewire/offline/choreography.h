@@ -19,8 +19,8 @@ namespace stridewire {
 inline constexpr std::size_t kMaxChoreographyBytes = std::size_t{4} << 20;
 inline constexpr std::size_t kMaxChoreographyMovements = 65'536;
 inline constexpr int kMaxChoreographyDepth = 16;  ///< Maximum depth of nested JSON values.
-/// Maximum magnitude of every coordinate in a choreography. Larger ones are rejected with
-/// kOutOfRange.
+/// Maximum magnitude of every coordinate in a choreography, except in its terrain. Larger ones are
+/// rejected with kOutOfRange.
 inline constexpr double kMaxChoreographyPositionM = 1e5;
 /// Maximum magnitude of every heading in a choreography. Larger ones are rejected with kOutOfRange.
 inline constexpr double kMaxChoreographyHeadingRad = 1e4;

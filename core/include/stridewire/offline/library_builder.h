@@ -56,7 +56,7 @@ struct SelectedExample {
 
 /// The selection of one group, in the order of RawGroup::examples.
 struct GroupSelection {
-  int group = 0;  ///< Index in MotionLibrary::groups().
+  int group = 0;  ///< Index in RawLibrary::groups.
   MovementKind kind = MovementKind::kStepLeft;
   std::vector<SelectedExample> examples;
   /// Ridge factor with which the stored examples were smoothed (LibraryBuilder::smooths). 0 if they
@@ -93,26 +93,30 @@ struct LibraryBuilder {
   /// Determines which examples are dropped: outliers before averaging, redundant examples after it.
   /// By default, none are dropped.
   SelectionOptions selection;
-  /// True: the selected examples are replaced with a smooth function of their parameters that is
-  /// robust against outliers. It contains what the examples have in common, without individual
-  /// variation. Leave-one-out pose errors determine the smoothness. Groups of d parameters with
-  /// fewer than 4 (d + 1) examples remain unchanged.
+  /// True: the selected examples are replaced with a smooth function of their parameters. It
+  /// contains what the examples have in common, without individual variation. Leave-one-out pose
+  /// errors determine the smoothness. Groups of d parameters with fewer than 4 (d + 1) examples are
+  /// excluded. In steps, jolts of trunk, head and arms are smoothed as well, and groups of straight
+  /// steps get variants (MotionGroup). Generated groups (RawGroup::is_completed) remain unchanged.
   bool smooths = false;
   /// True: toes bend upward where their tips are below the ground. This does not apply to generated
   /// groups (RawGroup::is_completed).
   bool bends_toes = false;
 
   struct Note {
-    int group = 0;
+    int group = 0;  ///< Index in RawLibrary::groups.
     std::string text;
   };
   /// Output of Build: notes on examples that were averaged, dropped or smoothed, and on parameters
   /// that are equal in all examples.
   std::vector<Note> notes;
-  std::vector<GroupSelection> selections;  ///< Output of Build, one per group.
+  /// Output of Build, one per group that has examples.
+  std::vector<GroupSelection> selections;
 
-  /// Errors: kOutOfRange, kShapeMismatch or kIllConditioned, with the group and the example in
-  /// Error::where.
+  /// Errors: those of Skeleton::Validate and Clip::Validate. kOutOfRange, kShapeMismatch or
+  /// kIllConditioned for groups. kInvalidArgument, kOutOfRange, kShapeMismatch or kLimitExceeded
+  /// for layers. Those of MotionLibrary::FromBytes if the result exceeds a limit of library files.
+  /// If a group, an example or a layer is the cause, Error::where contains it.
   [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Build(const RawLibrary& raw);
 };
 

@@ -19,7 +19,7 @@ struct RawExample {
   std::vector<double> keytimes_s;   ///< K_0 = 0 < ... < K_n.
   std::vector<double> parameters;   ///< One value per parameter in RawGroup::parameters.
   double heading_change_rad = 0.0;  ///< Heading at the end relative to the start.
-  /// Origin of the example: "16_21.bvh 0.93-1.47 s" or "generated start 0.35 end 0.55".
+  /// Origin of the example: "16_21.bvh 0.93-1.47 s" or "generated step 0.35 to 0.55 m".
   std::string source;
   bool mirrored = false;
 };

@@ -84,13 +84,14 @@ struct AvatarEvent {
   /// kStarted: parameters after clamping to the hull of the examples, enlarged by 10 %.
   ParameterValues applied;
   bool extrapolated = false;  ///< kStarted: `applied` is outside the hull of the examples.
-  /// kStarted: `applied` differs from `requested`, and planting does not reach the requested
-  /// footprint exactly.
+  /// kStarted: `applied` differs from `requested`, or the group lacks a requested parameter. False
+  /// if planting nevertheless reaches the requested footprint exactly.
   bool clamped = false;
-  bool is_cut_short = false;     ///< kFinished: another request interrupted the movement.
-  Foot foot = Foot::kLeft;       ///< kFootStrike: the foot that landed.
-  Vec3 position_m = Vec3(0.0f);  ///< kFootStrike: ball of that foot, in the world.
-  BaseFrame base;                ///< kFinished: base frame after the movement.
+  bool is_cut_short = false;  ///< kFinished: another request interrupted the movement.
+  /// kFootStrike: the foot that landed. kRejected with `missed`: the foot of the rejected step.
+  Foot foot = Foot::kLeft;
+  Vec3 position_m = Vec3(0.0f);              ///< kFootStrike: ball of that foot, in the world.
+  BaseFrame base;                            ///< kFinished: base frame after the movement.
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
   /// In static storage. kRejected, kDropped: one sentence. kIdle, kStarted of a stand: the reason
   /// why the feet are still apart; empty if they are together.
@@ -149,9 +150,9 @@ class AvatarSimulation;
 /// A character that plays requests one after the other. Its state consists of a base frame, a queue
 /// of requests, the current movement and the displayed pose.
 ///
-/// Time is an argument: only Advance moves the avatar. The same library, start, requests and time
-/// steps give the same pose bytes on every machine. Not thread-safe; avatars share nothing but the
-/// library and the terrain, so different avatars may be advanced by different threads.
+/// Time passes only in Advance. The same library, start, requests and time steps give the same pose
+/// bytes on every machine. Not thread-safe; avatars share nothing but the library and the terrain,
+/// so different avatars may be advanced by different threads.
 class Avatar {
  public:
   static constexpr int kMaxQueue = 1024;
@@ -175,8 +176,9 @@ class Avatar {
   /// an interrupt.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
-  /// Drops the requests in the queue and returns their number. A walk in progress is one of them.
-  /// It ends with its current step. The next Advance reports the dropped requests.
+  /// Drops the requests in the queue, including a walk in progress, and returns their number. The
+  /// next Advance reports them, except the walk, which ends with its current step and is reported
+  /// then.
   int CancelQueue();
 
   /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not

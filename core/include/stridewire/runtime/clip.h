@@ -52,8 +52,8 @@ struct Clip {
 void MakeSignContinuous(Clip& clip);
 
 /// Samples the pose at `time_s`, clamped to the duration of the clip. Interpolates positions and
-/// rotations with Catmull-Rom splines, so that velocities are continuous even at 30 frames per
-/// second. The signs of successive quaternions may differ.
+/// rotations with Catmull-Rom splines, so that velocities are continuous. The signs of successive
+/// quaternions in the clip may differ.
 void SampleClip(const Clip& clip, double time_s, PoseSpan out);
 
 }  // namespace stridewire

@@ -161,7 +161,8 @@ struct MotionGroup {
   std::vector<std::string_view> sources;
   std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if it is a mirrored copy, else 0.
   double ease_out_s = kEaseOutS;           ///< Maximum time over which difference poses fade out.
-  /// True if the sources of all examples begin with kCompletedSource. Requests prefer other groups.
+  /// True if the sources of all examples begin with kCompletedSource. Requests prefer other groups
+  /// that fit nearly as well.
   bool is_completed = false;
 
   /// Number of examples and variants, n + v.

@@ -71,10 +71,10 @@ struct StandRequest {
   double seconds = 0.0;
 };
 
-/// Requests a walk to a place, with as many steps as necessary (walk_planner.h). Events of its
-/// steps have the id of the request. When the avatar has arrived, a kFinished event of kind kStand
-/// with this id follows. If the walk fails, a kRejected event contains the reason. If the walk is
-/// dropped in progress, a kDropped event follows after its current step.
+/// Requests a walk to a place, with as many steps as necessary. Events of its steps have the id of
+/// the request. When the avatar has arrived, a kFinished event of kind kStand with this id follows.
+/// If the walk fails, a kRejected event contains the reason. If the walk is dropped in progress, a
+/// kDropped event follows after its current step.
 struct WalkRequest {
   /// Base frame at the end. y is ignored, because the ground determines it.
   DVec3 position_m = DVec3(0.0);

@@ -22,9 +22,8 @@ inline constexpr double kMinTerrainCellM = 0.01;
 inline constexpr double kMaxTerrainCellM = 1e3;
 inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Maximum magnitude of each coordinate.
 /// Maximum number of boxes that intersect one cell of the terrain's spatial index. The limit bounds
-/// the time of a query. A terrain exceeds it if more boxes overlap in one place, or if many small
-/// boxes are close together and others are far away, because the index has at most 1024 x 1024
-/// cells.
+/// the time of a query. A terrain exceeds it if too many boxes overlap, or if many boxes are close
+/// together and others are large or far away.
 inline constexpr std::size_t kMaxTerrainBoxesPerCell = 256;
 
 /// Horizontal position, in metres.

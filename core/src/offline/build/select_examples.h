@@ -22,9 +22,8 @@ struct Selected {
 //
 // 1. Drops outliers, if SelectionOptions::outlier_deviations is above 0.
 // 2. Averages examples within `diameter` of each other.
-// 3. If SelectionOptions::max_pose_error_m is above 0, chooses few of the averages: Starts with
-// one.
-//    Adds the average that the chosen ones reproduce worst, until all are reproduced within the
+// 3. If SelectionOptions::max_pose_error_m is above 0, chooses few of the averages. Starts with one
+//    and adds the average that the chosen ones reproduce worst, until all are reproduced within the
 //    error bound. Finally, removes chosen averages without which the bound is still met.
 //
 // The result does not depend on the number of threads.

@@ -32,23 +32,23 @@ inline constexpr double kVariantToeMarginM = 0.015;
                                                       std::span<const double> units,
                                                       bool is_smooth);
 
-// Returns one time per grid point, in seconds, at which to sample a captured step so that it moves
-// forward like the blend for its parameters: the time at which the root of the step has covered the
-// same fraction of its path past the standing foot as the root of the blend has covered at the grid
-// point. Otherwise, a variant would change the speed of the body, and each transition to another
-// step would have to brake or accelerate the body. If the root of the step or of the blend does not
-// move forward throughout, returns the times of the step's own grid points. `group` must have
-// weights.
+// Returns the times at which to sample a captured step, one per grid point, in seconds. At each
+// time, the root has covered the same fraction of its path past the standing foot as at the grid
+// point in the group's blend for the parameters of the step. A variant sampled at other times would
+// change the speed of the body, and each transition to another step would have to brake or
+// accelerate the body. If the root of the step or of the blend does not move forward throughout,
+// returns the times of the step's own grid points. `group` must have weights.
 [[nodiscard]] std::vector<double> TimesOfBlend(const MotionGroup& group, const GridLayout& layout,
                                                const Skeleton& skeleton,
                                                const GridExample& captured);
 
-// Adapts a variant to what the group blends for its parameters:
+// Adapts a variant to the group's blend for its parameters:
 //
-// - The variant gets the keytimes of the blend. If a varied step had other keytimes, short
-//   intervals would be played much faster.
-// - The root is moved sideways, proportionally to the grid point, so that it ends where that of the
-//   blend ends. Otherwise, the differences would add up, and walks would leave their line.
+// - The variant gets the keytimes and the heading change of the blend. If a varied step had other
+//   keytimes, short intervals would be played much faster.
+// - The root is moved sideways, in proportion to the index of the grid point, so that it ends where
+//   that of the blend ends. Otherwise, the differences would add up, and walks would leave their
+//   line.
 //
 // `group` must have weights.
 void AdaptToBlend(const MotionGroup& group, const GridLayout& layout, GridExample& variant);

@@ -564,10 +564,12 @@ class StepGenerator {
   Foot moving_;
   Foot fixed_;
   StepFeet feet_;
+  // Forward distance between the feet at the start and at the end: 0 as in a stand, 1 as in the
+  // captured stride.
   double start_share_ = 0.0;
   double end_share_ = 0.0;
-  // 0 in steps that start or end in a stand. Increases to 1 for steps that start and end in at
-  // least half of the captured stride.
+  // 0 if one of these shares is 0, and 1 if both are at least 0.5. In between, proportional to the
+  // smaller share.
   double in_stride_ = 0.0;
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;

@@ -78,8 +78,8 @@ constexpr double kChangeM = 1e-6;
 constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
 
-// In walks of libraries with generated groups, a group costs kTransitionWeight per metre by which
-// its transition distance from the previous movement exceeds kFreeTransitionM. Otherwise, if the
+// In walks, a group of a library with generated groups costs kTransitionWeight per metre by which
+// its Transition::distance_m from the previous movement exceeds kFreeTransitionM. Otherwise, if the
 // captured steps of a library are crouched and its generated steps upright, the body would rise and
 // fall from step to step.
 constexpr double kTransitionWeight = 0.5;
@@ -239,7 +239,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   return plan;
 }
 
-// Returns the additional cost of a group in a walk after another group.
+// Returns the additional cost of group `to` in a walk after group `from` (see kTransitionWeight).
 double TransitionCost(const MotionLibrary& library, std::size_t from, std::size_t to) {
   const Transition* transition = library.FindTransition(from, to);
   if (transition == nullptr) return 0.0;

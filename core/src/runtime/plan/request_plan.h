@@ -112,9 +112,9 @@ inline constexpr double kMaxPlantedErrorM = 0.6;
 /// Origin of a footprint. A walk can choose another footprint if no step fits; a request cannot.
 struct FootprintOrigin {
   bool is_walk = false;
-  /// In a walk: the group of the previous movement, or the number of groups after a stand. Groups
-  /// whose movements start in a pose far from the end of the previous one cost more
-  /// (MotionLibrary::FindTransition).
+  /// In a walk: the group of the previous movement, or the number of groups after a stand. In
+  /// libraries with generated groups, a group costs more if its movements start far from the pose
+  /// in which the previous movement ends (MotionLibrary::FindTransition).
   std::optional<std::size_t> after;
 };
 

@@ -10,11 +10,11 @@
 namespace stridewire {
 namespace {
 
-// Maximum acceleration of the root due to the blend from the previous pose, unless the blend would
-// then take longer than kMaxApproachS. At the start of the blend, this limit is reduced by the
-// component of the movement's own acceleration in the direction of the blend's acceleration. It is
-// thus higher if the two oppose each other, and never lower than kLeastMaxMPerS2. In captures of
-// starts and stops, the root accelerates by 4 to 4.6 m/s^2 in total.
+// Maximum acceleration of the root due to the blend from the previous pose. A blend that would take
+// longer than its maximum duration exceeds it. At the start of the blend, the limit is lower if the
+// movement itself accelerates the root in the same direction, but at least kLeastMaxMPerS2. It is
+// higher if the movement accelerates the root in the opposite direction. In captures of starts and
+// stops, the root accelerates by 4 to 4.6 m/s^2 in total.
 constexpr double kMaxAccelerationMPerS2 = 2.5;
 constexpr double kLeastMaxMPerS2 = 1.0;
 constexpr double kMaxApproachS = 0.8;
@@ -71,8 +71,8 @@ double ApproachTime(const DVec3& offset_m, const DVec3& offset_m_s, const DVec3&
 }
 
 // Returns true if the feet are apart in the walking direction at the start and end of a step. Uses
-// the heading at the start for both, because records do not contain the heading change of the
-// examples.
+// the heading at the start for both, because movement records do not contain the heading change of
+// the examples.
 bool IsStride(const FootPlan& plan, double heading_rad) {
   const auto ahead_m = [&](const Footprint& left, const Footprint& right) {
     return std::fabs(RotateYaw(-heading_rad, left.position_m - right.position_m).z);
@@ -82,10 +82,10 @@ bool IsStride(const FootPlan& plan, double heading_rad) {
 }
 
 // Returns the horizontal acceleration of the root in a movement without its difference pose, as a
-// mean over the first 80 % of the blend-in. Returns 0 if there are no samples of the blend-in.
-// `offset_m` and `offset_m_s` are the offset and the velocity that the difference pose adds to the
-// root at the start. `above_feet` returns the position of the root relative to the standing feet
-// in a sample.
+// mean over the first 80 % of the blend-in. Returns 0 except for steps on level ground, because
+// other movements have no samples of the blend-in. `offset_m` and `offset_m_s` are the offset and
+// the velocity that the difference pose adds to the root at the start. `above_feet` returns the
+// position of the root relative to the standing feet in a sample.
 template <typename AboveFeet>
 DVec3 OwnAcceleration(const TransitionSamples& samples, const AboveFeet& above_feet,
                       const DVec3& offset_m, const DVec3& offset_m_s, double ease_out_s) {

@@ -17,9 +17,9 @@ struct WalkStance {
   std::array<Footprint, 2> feet;  ///< [foot]: positions and headings of the feet.
   double heading_rad = 0.0;       ///< Heading of the body, unwrapped.
   Foot last_moved = Foot::kRight;
-  FootState vector;          ///< Relative position of the feet, for PlanStep.
+  FootState vector;          ///< Relative position of the feet, for PlanFootprint.
   double last_step_s = 0.0;  ///< Duration of the previous step. 0 if the avatar is not walking.
-  /// FootprintOrigin::after.
+  /// Group of the previous movement, as in FootprintOrigin::after.
   std::optional<std::size_t> last_group;
   /// True if feet land exactly on their footprints. False without foot planting.
   bool is_exact = true;

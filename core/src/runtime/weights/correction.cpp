@@ -105,7 +105,8 @@ void SolveFactored(const Matrix& factor, std::size_t rows, Vector& right) {
 // Solves for the change of the weights in one Gauss-Newton iteration (see CorrectWeights).
 class WeightStep {
  public:
-  // `slopes` is J, [d][n], in metres. `total` is the sum of the corrected weights.
+  // `slopes` is J, [d][n], in metres. For Vary, `slopes` instead contains the `d` rows of
+  // KeepInVariation. `total` is the sum of the corrected weights.
   WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d,
              double total)
       : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1), total_(total) {
@@ -144,7 +145,7 @@ class WeightStep {
   }
 
   // Writes the change of the weights [n] in the direction of `variation`, without the part that
-  // changes the parameters or the sum.
+  // changes the quantities in the rows of `slopes` or the sum of the weights.
   void Vary(const StrideVariation& variation, std::span<double> change) const {
     for (std::size_t e = 0; e < n_; ++e) change[e] = variation.WeightDirection(e) * weights_[e];
     Vector y{};

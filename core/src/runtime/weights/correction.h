@@ -88,10 +88,10 @@ class CorrectionScratch {
 ///
 /// If the sum of |w| exceeds `limits.start_weight_sum`, negative weights are scaled down first. If
 /// the sum of |w| would come within 0.1 of its limit, the part of w that does not affect the
-/// parameters shrinks by the required amount. If an iteration increases the error or makes the
-/// weights too large, its change is halved up to three times. The best w is kept, so the result is
-/// never worse than without correction. An error remains if no weights within the limit reach p^,
-/// or if the iterations do not suffice.
+/// parameters shrinks. If an iteration increases the error or makes the weights too large, its
+/// change is halved up to three times. The best w is kept, so the result is never worse than
+/// without correction. An error remains if no weights within the limit reach p^, or if the
+/// iterations do not suffice.
 ///
 /// With `variation`, steps of groups with one or two parameters deviate before they are corrected:
 ///
