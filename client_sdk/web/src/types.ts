@@ -22,7 +22,7 @@ export type {
  *   site is at most 1 mm.
  * - `movement`: the client evaluates movements with the world's motion library, which it fetches
  *   from the server first. The poses are exactly those of the server. A recording stores them with
- *   the precision of `quantised`.
+ *   at least the precision of `quantised`.
  */
 export type PoseMode = 'full' | 'quantised' | 'movement';
 /**
@@ -52,8 +52,9 @@ type Given<T> = {[name in keyof T]?: NonNullable<T[name]>};
 type Optional<T, K extends keyof T> = Omit<T, K> & {[name in K]?: T[name]};
 
 /**
- * Parameters of a movement: `turn` in radians, all others in metres. Positions and distances are
- * those of the moving foot relative to the fixed foot, in the base frame.
+ * Parameters of a movement: `turn` in radians, all others in metres. Those that begin with `start`
+ * or `end` are positions of the moving foot relative to the fixed foot, before and after a step.
+ * `length` and `height` are those of a jump.
  */
 export type Parameters = {readonly [name in ParameterName]?: number};
 
@@ -66,7 +67,8 @@ export interface Reply {
   readonly ok: boolean;
   /**
    * Status code, one of `Status`; 0 if ok. 1xx: the caller, 2xx: data, 3xx: network, 4xx: server.
-   * If only items failed: the code of the first failed one.
+   * If the server accepted the command but refused some of its items: the code of the first
+   * refused item.
    */
   readonly code: number;
   /** Name of the code, for example `no_such_avatar`. */
@@ -219,7 +221,7 @@ export interface Skeleton {
 }
 
 /**
- * Origin of a sampled pose.
+ * How a sampled pose was obtained.
  * - `interpolated`: from the received poses around the sampled time, or exactly a received one.
  * - `extrapolated`: the next pose has not arrived. The motion continues, and stops after 0.25 s.
  * - `held`: the motion has stopped, because no later pose continues it.
@@ -318,7 +320,8 @@ export interface World {
   /** Names of the motion library's layers, for `setLayers`. */
   readonly layers: readonly string[];
   readonly recording: Recording;
-  /** The ground of the world. Null if it is flat at height 0. A change replaces the object. */
+  /** The ground of the world. Null if it is flat at height 0. When the terrain changes, a new
+   * object replaces this one. */
   readonly terrain: Terrain | null;
   /** The server's first reply to joining. */
   readonly joined: Promise<Reply>;
