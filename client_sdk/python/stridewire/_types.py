@@ -69,7 +69,11 @@ class Kind(enum.IntEnum):
 
 
 class Foot(enum.IntEnum):
-    """The foot that a step moves. AUTO is the foot that did not move last."""
+    """The foot that a step moves.
+
+    AUTO: while walking, the foot that did not move last; from a stand, the foot that fits the
+    request better.
+    """
 
     AUTO = 0
     LEFT = 1

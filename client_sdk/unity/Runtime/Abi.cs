@@ -73,7 +73,8 @@ namespace Stridewire
     /// <summary>stridewire_foot of the C API.</summary>
     public enum Foot
     {
-        /// <summary>In requests: the foot that did not move last.</summary>
+        /// <summary>In requests: while walking, the foot that did not move last; from a stand, the
+        /// foot that fits the request better.</summary>
         Auto = 0,
         Left = 1,
         Right = 2,

@@ -87,10 +87,11 @@ typedef struct stridewire_client_options {
   /// Delay of the render time behind the server time in seconds, at most 10. If it is negative,
   /// which is the default, the client adapts the delay to the connection.
   double render_delay_s;
-  /// Timeout for the TCP connection and for the handshake, each in seconds, 0.01 to 600. Default 5.
+  /// Timeout in seconds, 0.01 to 600. It applies to the TCP connection and, again, to the
+  /// handshake. Default 5.
   double connect_timeout_s;
-  /// Interval of pings in seconds, 0.01 to 600. The client shortens it to a third of the server's
-  /// idle timeout. Default 1.
+  /// Interval of pings in seconds, 0.01 to 600. If it exceeds a third of the server's idle timeout,
+  /// the client uses that third instead. Default 1.
   double ping_interval_s;
   /// Seed for the random part of reconnect delays. 0: the client chooses a random seed. Default 0.
   uint64_t seed;
@@ -540,7 +541,7 @@ typedef struct stridewire_playout {
 stridewire_status stridewire_client_get_playout(stridewire_client* client,
                                                 stridewire_playout* playout);
 
-/// Origin of a sampled pose.
+/// How a pose was obtained.
 typedef enum stridewire_pose_kind {
   STRIDEWIRE_POSE_MISSING = 0,  ///< No pose is known for that time. Other fields are 0.
   /// Interpolated between two received poses, or equal to a received pose.

@@ -37,7 +37,9 @@ typedef enum stridewire_movement_type {
 
 /// A foot of an avatar.
 typedef enum stridewire_foot {
-  STRIDEWIRE_FOOT_AUTO = 0,  ///< In requests: the foot that did not move last.
+  /// In requests: while walking, the foot that did not move last; from a stand, the foot that fits
+  /// the request better.
+  STRIDEWIRE_FOOT_AUTO = 0,
   STRIDEWIRE_FOOT_LEFT = 1,
   STRIDEWIRE_FOOT_RIGHT = 2,
   STRIDEWIRE_FOOT_MAX = 0x7fffffff
