@@ -119,8 +119,8 @@ class SessionStream {
   void SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames);
   /// Returns how long batches of a tick may wait for those of other shards. 0: they do not wait.
   [[nodiscard]] double GatherTime() const;
-  /// Call it after passing a batch that may wait to the connection. Sends all batches of the tick
-  /// once those of all shards have arrived.
+  /// Call it after a batch that may wait was passed to the connection. Sends all batches of the
+  /// tick once those of all shards have arrived.
   void OnGathered(std::uint64_t tick, int shard);
   void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
   /// Numbers a message, sends it if the client is connected, and stores it in event_replay_. If the
