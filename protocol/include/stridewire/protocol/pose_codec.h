@@ -86,7 +86,8 @@ inline constexpr float kUnitTolerance = 1e-3f;
 /// content of `out` is unspecified. Error codes:
 ///   kShapeMismatch  the size of `out` is not PoseBytes(mode, rotations.size())
 ///   kOutOfRange     a number is not finite, a length deviates from 1 by more than kUnitTolerance,
-///                   or a quantised root exceeds kMaxRootM; `index` is the joint
+///                   or a quantised root exceeds kMaxRootM; `index` is the joint of a rotation, or
+///                   the axis (0 to 2) in which the root is too far away
 ///   kUnsupported    another mode
 [[nodiscard]] Status EncodePose(PoseMode mode, const Vec3& root_position_m,
                                 std::span<const Quat> rotations, std::span<std::byte> out);
