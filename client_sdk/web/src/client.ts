@@ -52,8 +52,8 @@ export class Client {
    *     the module
    * @throws RangeError an option is out of range
    * @throws SyntaxError a URL does not start with ws:// or wss://
-   * @throws TypeError an option has the wrong type, there is no WebSocket class, or the machine is
-   *     big-endian
+   * @throws TypeError an option has the wrong type, a URL is invalid, there is no WebSocket class,
+   *     or the machine is big-endian
    */
   constructor(options: ClientOptions) {
     if (new Uint8Array(new Uint16Array([1]).buffer)[0] !== 1) {
