@@ -79,10 +79,9 @@ struct BvhReadOptions {
 /// - Numbers may have decimal commas if no number has a decimal point.
 /// - The figure is the first ROOT whose joint names identify two legs or, if there is none, the
 ///   first ROOT that has legs. Its root is the lowest joint above both legs and the rest of the
-///   body, and contains the motion of all joints above it. Between the root and the legs, no joint
-///   may change its offset. Parts of the body that branch off too high for that are attached to the
-///   root. Branches that are no part of the body, such as cameras, are left out if they begin above
-///   the root.
+///   body, or a lower joint if necessary: all joints between the root and the legs must keep their
+///   offsets. The root contains the motion of all joints above it. Parts of the body that branch
+///   off above the root are attached to it. Other branches there, such as cameras, are left out.
 /// - Position channels of the root replace its OFFSET. For any other joint, the mean of the
 ///   position channels becomes the offset, unless all of them are zero. A note states the largest
 ///   deviation from the mean. If a joint of the legs, the trunk or the arms is ever more than 2 cm
