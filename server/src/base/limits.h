@@ -29,6 +29,10 @@ struct Limits {
   double write_timeout_s = 30.0;  ///< Maximum time without progress of a pending write.
   /// Time for which a detached session waits for its client; 0: sessions cannot be resumed.
   double resume_window_s = 60.0;
+  /// Maximum time for which a batch of one shard waits for those of other shards, so that they are
+  /// sent in one WebSocket message; 0: batches never wait.
+  double websocket_gather_s = 0.004;
+  int max_http_connections = 64;
 
   // Worlds and avatars.
   int max_worlds = 256;
@@ -63,11 +67,6 @@ struct Limits {
   std::size_t event_replay_bytes = std::size_t{1} << 20;
   /// Value of SO_SNDBUF; 0: the default of the system.
   std::size_t socket_send_buffer_bytes = 0;
-  /// Maximum time for which a batch of one shard waits for those of other shards, so that they are
-  /// sent in one WebSocket message; 0: batches never wait.
-  double websocket_gather_s = 0.004;
-
-  int max_http_connections = 64;
 };
 
 /// Labels of the metric stridewire_limit_reached_total.

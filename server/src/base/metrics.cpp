@@ -159,15 +159,15 @@ std::string Metrics::Text() {
   counter("stridewire_pose_errors_total", "Poses that could not be encoded.",
           &ThreadMetrics::pose_errors);
   counter("stridewire_batches_composed_total",
-          "Pose batches composed for sessions that observe selected avatars or a region.",
+          "Frames of pose batches composed for sessions that observe selected avatars or a region.",
           &ThreadMetrics::batches_composed);
-  counter("stridewire_batches_sent_total", "Pose batches written to sockets.",
+  counter("stridewire_batches_sent_total", "Frames of pose batches written to sockets.",
           &ThreadMetrics::batches_sent);
   counter("stridewire_websocket_messages_sent_total",
           "WebSocket messages sent. One message may contain several batches.",
           &ThreadMetrics::websocket_messages_sent);
   counter("stridewire_batches_dropped_total",
-          "Pose batches dropped because an observer was too slow.",
+          "Frames of poses and movements dropped because an observer was too slow.",
           &ThreadMetrics::batches_dropped);
   counter("stridewire_events_dropped_total",
           "Events dropped because a client was too slow or disconnected too long.",
