@@ -26,15 +26,24 @@ void ReplicaSet::EndContinued(PoseSink& sink) {
   }
 }
 
+// Discards the avatars of the shard. Later messages of changes have no effect on them until the
+// server sends their states.
+void ReplicaSet::Discard(Shard& shard, PoseSink& sink) {
+  for (const Avatar& avatar : shard.avatars) sink.OnGone(avatar.id);
+  STRIDEWIRE_CHECK(avatar_count_ >= shard.avatars.size());
+  avatar_count_ -= shard.avatars.size();
+  shard = {};
+}
+
 // Discards the shard's avatars if `message` does not follow the last message that was applied.
 void ReplicaSet::Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink) {
   const std::uint64_t previous_step = message.states ? message.step : message.step - 1;
   const std::uint16_t part = message.states ? 0 : message.part;
   if (shard.is_synchronized && previous_step == shard.step && part == shard.parts_applied) return;
-  for (const Avatar& avatar : shard.avatars) sink.OnGone(avatar.id);
-  STRIDEWIRE_CHECK(avatar_count_ >= shard.avatars.size());
-  avatar_count_ -= shard.avatars.size();
-  shard = {.is_synchronized = true, .step = previous_step, .parts_applied = part, .avatars = {}};
+  Discard(shard, sink);
+  shard.is_synchronized = true;
+  shard.step = previous_step;
+  shard.parts_applied = part;
 }
 
 Status ReplicaSet::ApplyRecord(const protocol::Movements& message, std::size_t i, Shard& shard,
@@ -140,7 +149,10 @@ Status ReplicaSet::Apply(const protocol::Movements& message, PoseSink& sink) {
   }
   std::erase_if(shard.avatars, [](const Avatar& avatar) { return avatar.replica == nullptr; });
   CheckAvatarCount();
-  if (!status) return status;
+  if (!status) {
+    Discard(shard, sink);
+    return status;
+  }
   due_.clear();
   if (message.states) {
     for (const protocol::AvatarId id : message.avatars) {

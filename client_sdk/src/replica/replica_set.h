@@ -37,7 +37,7 @@ class PoseSink {
   virtual void Prefetch(protocol::AvatarId) {}
 
   /// Called when an avatar is removed or leaves the subscription, or when its state is discarded
-  /// because a message is missing.
+  /// because a message is missing or invalid.
   virtual void OnGone(protocol::AvatarId avatar) = 0;
 
   /// Called when the state of an unknown avatar arrives. If it returns false, the set ignores the
@@ -58,7 +58,7 @@ class PoseSink {
 /// - If a message of changes follows the previous message, the set applies its records. After the
 ///   last part of a step, it advances all avatars of the shard by one tick.
 /// - A message of states contains the complete states of avatars that the client does not know yet.
-/// - If a message is missing, the set discards all avatars of the shard until the server sends
+/// - If a message is missing or invalid, the set discards all avatars of the shard until the server sends
 ///   their states.
 ///
 /// Used by the client library and by stridewire-load. Not thread-safe.
@@ -72,8 +72,8 @@ class ReplicaSet {
 
   /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded if
   /// there are too many shards. Fails with the error of AvatarReplica::Apply if a record is invalid
-  /// or was made with another library. After an error, the avatars of the shard are invalid until
-  /// the server sends their next states.
+  /// or was made with another library. An invalid record discards all avatars of the shard until
+  /// the server sends their states.
   [[nodiscard]] Status Apply(const protocol::Movements& message, PoseSink& sink);
 
   [[nodiscard]] const std::shared_ptr<const MotionLibrary>& library() const { return library_; }
@@ -100,6 +100,7 @@ class ReplicaSet {
   };
 
   void EndContinued(PoseSink& sink);
+  void Discard(Shard& shard, PoseSink& sink);
   void Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink);
   [[nodiscard]] Status ApplyRecord(const protocol::Movements& message, std::size_t i, Shard& shard,
                                    PoseSink& sink);

@@ -249,6 +249,29 @@ TEST(ReplicaSet, RejectsAnInvalidRecord) {
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
 }
 
+TEST(ReplicaSet, DiscardsAllAvatarsOfAShardAfterAnInvalidRecord) {
+  for (const bool states : {false, true}) {
+    Server server(3);
+    CollectingSink sink;
+    ReplicaSet replicas(server.library(), kTickS, 100);
+    ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+    Movements message = states ? server.States() : server.Step();
+    message.records.assign(1, std::byte{0xff});
+    message.avatars = {2};
+    message.flags = {0};
+    message.ends = {1};
+    EXPECT_FALSE(replicas.Apply(message, sink));
+    EXPECT_EQ(replicas.avatar_count(), 0u);
+    EXPECT_EQ(sink.gone, (std::set<AvatarId>{1, 2, 3}));
+    sink.gone.clear();
+    for (int i = 0; i < 5; ++i) ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+    EXPECT_EQ(server.CountEqualPoses(sink), 0);
+    ASSERT_TRUE(replicas.Apply(server.States(), sink));
+    ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+    EXPECT_EQ(server.CountEqualPoses(sink), 3);
+  }
+}
+
 protocol::WorldInfo DescribeWorld(const MotionLibrary& library) {
   protocol::WorldInfo info;
   for (const Joint& joint : library.skeleton().joints) {
