@@ -45,8 +45,8 @@ protocol::CurrentMovement CurrentMovementOf(const AvatarSimulation& avatar,
   }
   if (weight_count * parameter_count * sizeof(float) > max_site_bytes) return current;
   current.sites.reserve(weight_count * parameter_count);
-  for (std::size_t example = 0; example < weight_count; ++example) {
-    for (const double value : group.site(static_cast<int>(example)).first(parameter_count)) {
+  for (std::size_t row = 0; row < weight_count; ++row) {
+    for (const double value : group.row_parameters(static_cast<int>(row)).first(parameter_count)) {
       current.sites.push_back(static_cast<float>(value));
     }
   }

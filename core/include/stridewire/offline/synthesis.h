@@ -35,14 +35,14 @@ struct MovementRecord {
   std::vector<double> keytimes_s;
   ParameterValues requested;
   ParameterValues applied;  ///< `requested`, clamped to the hull of the examples plus 10 %.
-  /// Weighted sum of the examples' parameters, with the weights of the blend. The weight correction
-  /// chooses these weights so that `measured` equals `applied`. Without weight correction, equals
-  /// `applied`.
+  /// Sum of the parameters of the blended examples and variants, each multiplied by its weight. The
+  /// weight correction chooses the weights so that `measured` equals `applied`. Equals `applied` if
+  /// the library has no pseudoexamples, and weight correction and stride variation are disabled.
   ParameterValues corrected;
   ParameterValues measured;  ///< Parameters measured on the movement, a(p) in the paper.
   bool extrapolated = false;
   bool clamped = false;
-  std::vector<float> weights;
+  std::vector<float> weights;  ///< [row]: weights of the examples, then of the variants.
   std::vector<PlantRecord> plants;
   /// Steps only: horizontal distance of the moving foot from the requested footprint when the foot
   /// has just landed. Without planting: distance between the measured and the requested position of

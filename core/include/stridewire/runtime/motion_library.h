@@ -179,6 +179,10 @@ struct MotionGroup {
     return variant_parameters.subspan(static_cast<std::size_t>(i) * parameters.size(),
                                       parameters.size());
   }
+  /// Returns the parameters [d] of a row: of an example or a variant.
+  [[nodiscard]] std::span<const double> row_parameters(int row) const {
+    return row < example_count ? site(row) : variant(row - example_count);
+  }
 };
 
 /// An immutable library of examples. It is a view of verified bytes, either a mapped `.swl` file or

@@ -153,14 +153,16 @@ void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footpr
   record.landing_error_rad = std::fabs(WrapAngle(lands.heading_rad - requested.heading_rad));
 }
 
-// Returns the weighted mean of the parameters of the examples, sum w_i p_i. Without weight
-// correction and pseudoexamples, these are the parameters for which the weights were computed.
+// Returns the weighted mean of the parameters of the examples and variants, sum w_i p_i. Without
+// weight correction, stride variation and pseudoexamples, these are the parameters for which the
+// weights were computed.
 ParameterValues MeanParameters(const MotionGroup& group, std::span<const float> weights) {
   ParameterValues mean;
   mean.count = group.parameter_count();
-  for (std::size_t e = 0; e < weights.size(); ++e) {
-    for (std::size_t l = 0; l < group.parameters.size(); ++l) {
-      mean.values[l] += static_cast<double>(weights[e]) * group.site(static_cast<int>(e))[l];
+  for (std::size_t row = 0; row < weights.size(); ++row) {
+    const std::span<const double> parameters = group.row_parameters(static_cast<int>(row));
+    for (std::size_t l = 0; l < parameters.size(); ++l) {
+      mean.values[l] += static_cast<double>(weights[row]) * parameters[l];
     }
   }
   return mean;

@@ -14,6 +14,7 @@
 #include "runtime/weights/measure.h"
 #include "runtime/weights/variant_choice.h"
 #include "stridewire/offline/library_builder.h"
+#include "stridewire/offline/synthesis.h"
 #include "test_library.h"
 
 namespace stridewire {
@@ -234,6 +235,36 @@ TEST_F(Variants, AreBlendedOnlyInVariedSteps) {
     EXPECT_LT(LargestDifference(group(), wanted, measured), 2e-4);
   }
   EXPECT_GT(chosen.size(), 1u);
+}
+
+TEST_F(Variants, CountWithTheirOwnParametersInRecords) {
+  std::vector<MovementRequest> requests;
+  for (std::uint64_t id = 1; id <= 12; ++id) {
+    requests.push_back({id, StepRequest{.length_m = 0.32}});
+  }
+  AvatarOptions options;
+  options.stride_variation = true;
+  const auto played = Synthesize({.library = library_, .requests = requests, .options = options});
+  ASSERT_TRUE(played.has_value()) << played.error().text;
+  int varied = 0;
+  for (const MovementRecord& record : played->movements) {
+    const MotionGroup& steps = library_->group(static_cast<std::size_t>(record.group));
+    const auto n = static_cast<std::size_t>(steps.example_count);
+    ASSERT_EQ(record.weights.size(), static_cast<std::size_t>(steps.row_count()));
+    for (std::size_t l = 0; l < steps.parameters.size(); ++l) {
+      double sum = 0.0;
+      for (std::size_t e = 0; e < n; ++e) {
+        sum += static_cast<double>(record.weights[e]) * steps.site(static_cast<int>(e))[l];
+      }
+      for (std::size_t v = n; v < record.weights.size(); ++v) {
+        if (record.weights[v] != 0.0f) ++varied;
+        sum += static_cast<double>(record.weights[v]) * steps.variant(static_cast<int>(v - n))[l];
+      }
+      EXPECT_NEAR(record.corrected.values[l], sum, 1e-9);
+      EXPECT_NEAR(record.corrected.values[l], record.applied.values[l], 0.05);
+    }
+  }
+  EXPECT_GT(varied, 0);
 }
 
 TEST_F(Variants, AreNotChosenForDistantSteps) {
