@@ -28,7 +28,7 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 /// A start position and a list of movements that an avatar plays one after the other. As JSON:
 ///
 ///   {"start": {"position_m": [0, 0, 0], "heading_rad": 0},
-///    "terrain": {... see terrain_file.h ...},
+///    "terrain": {"boxes": [{"min_m": [1, 1], "max_m": [2, 3], "height_m": 0.2}]},
 ///    "movements": [
 ///      {"step": {"length_m": 0.6}},
 ///      {"step": {"foot": "left", "length_m": 0.5, "side_m": 0.1, "height_m": 0.15,
@@ -44,6 +44,8 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;
 /// `movements` is required. `start` and its fields are optional (default: the origin, heading 0),
 /// and so is `terrain` (default: flat at y = 0). Unknown and duplicate keys are errors.
 ///
+/// - terrain: `boxes` and `height_field` are optional. A height field requires `origin_m` ([x, z]),
+///   `cell_m`, `columns`, `rows` and `heights_m` (row by row, x fastest).
 /// - step: requires either `length_m`, with optional `side_m`, `height_m` and `turn_rad`, or
 ///   `at_m`, the world position where the ball of the foot lands. With `at_m`, the heading of the
 ///   footprint, `heading_rad`, is optional. With `exact_only`, the step is skipped if the foot

@@ -74,13 +74,13 @@ struct GroupSelection {
 /// generic-time grid, aligns quaternion hemispheres, selects or averages examples as configured,
 /// and solves for the interpolation weights.
 struct LibraryBuilder {
-  /// Returns a builder that is configured to store all captured movements. It bends toes upward
-  /// where they are below the ground, and changes nothing else.
+  /// Returns a builder that is configured to store all captured movements. It only averages
+  /// duplicates (see `cluster_diameter`) and bends toes upward where they are below the ground.
   [[nodiscard]] static LibraryBuilder KeepingAll();
   /// Returns a builder that is configured to keep a representative selection of captured movements.
-  /// It drops outliers beyond five deviations, averages movements within 5 cm of each other, and
-  /// drops those that the others reproduce within 2.5 cm. Finally, it smooths the kept movements
-  /// and bends toes upward where they are below the ground.
+  /// It drops outliers beyond five deviations, and averages movements whose parameters are within 5
+  /// cm of each other. It then drops movements whose poses the others reproduce within 2.5 cm.
+  /// Finally, it smooths the kept movements and bends toes upward where they are below the ground.
   [[nodiscard]] static LibraryBuilder Selecting();
 
   /// Approximate number of grid cells per second of mean duration. A group has more cells if an

@@ -93,8 +93,8 @@ struct AvatarEvent {
   Vec3 position_m = Vec3(0.0f);              ///< kFootStrike: ball of that foot, in the world.
   BaseFrame base;                            ///< kFinished: base frame after the movement.
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
-  /// In static storage. kRejected, kDropped: one sentence. kIdle, kStarted of a stand: the reason
-  /// why the feet are still apart; empty if they are together.
+  /// kRejected, kDropped: one sentence. kIdle, kStarted of a stand: the reason why the feet are
+  /// still apart; empty if they are together. Points to static storage.
   const char* reason = "";
   /// kRejected: set if the request was a step or jump that is out of reach.
   std::optional<FootprintError> missed;
@@ -182,8 +182,8 @@ class Avatar {
   int CancelQueue();
 
   /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not
-  /// exist, kOutOfRange if a number is not finite or out of its range, kLimitExceeded if
-  /// another layer would have to start while four layers are playing.
+  /// exist, kOutOfRange if a number is not finite or out of range, kLimitExceeded if another layer
+  /// would have to start while four layers are playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
   /// Moves the avatar to `start` at once. It then stands. Drops the current movement and the queue,
@@ -257,8 +257,8 @@ struct WalkSpeeds {
   [[nodiscard]] bool IsOutside(double speed_m_s) const;
 };
 
-/// Measures the range by simulating a fast and a slow walk of a few metres. The same library gives
-/// the same values on every machine.
+/// Measures the range of walking speeds by simulating a fast and a slow walk of a few metres. The
+/// same library gives the same values on every machine.
 [[nodiscard]] WalkSpeeds MeasureWalkSpeeds(const std::shared_ptr<const MotionLibrary>& library);
 
 }  // namespace stridewire

@@ -117,6 +117,8 @@ inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 inline constexpr std::string_view kCompletedSource = "completed";
 
 /// Maximum time over which a difference pose fades out (T in Section 5 of the paper), in seconds.
+/// Applies to the groups of a library file; groups of standing avatars have longer times
+/// (MotionGroup::ease_out_s).
 inline constexpr double kEaseOutS = 0.2;
 
 /// Examples that can be blended with each other. They have the same kind, parameters, number of
@@ -253,7 +255,7 @@ class MotionLibrary {
   [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
   /// Geometry of the skeleton's legs, for foot planting.
   [[nodiscard]] const LegRig& leg_rig() const { return *leg_rig_; }
-  /// Typical lengths and widths of the library's steps, from which walks are planned.
+  /// Typical lengths and widths of the library's steps, used to plan walks.
   [[nodiscard]] const LocomotionProfile& locomotion_profile() const { return *locomotion_profile_; }
   /// XXH3-128 hash of the payload, as 32 lower-case hexadecimal digits.
   [[nodiscard]] const std::string& hash() const { return hash_; }

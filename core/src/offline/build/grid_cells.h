@@ -18,8 +18,8 @@ inline constexpr double kStoredErrorRad = 0.45 / 57.29577951308232;
 // Chooses the number of grid cells per keytime interval for a group of valid examples. Starts with
 // the result of CellsAtRate for `fps`, and adds cells until no example is stored with an error
 // above kStoredErrorRad. More cells are needed for slow examples in a group of fast ones, and for
-// captures with fast rotations. In each interval, the number is limited by the frames of the
-// longest example and by the size of the grid. Generated steps (RawGroup::is_completed) get no
+// captures with fast rotations. The number of frames of the longest example and the size of the
+// grid limit the number of cells in each interval. Generated steps (RawGroup::is_completed) get no
 // additional cells, since they are smooth. `stand_root`: see ResampleOnGrid.
 [[nodiscard]] std::vector<int> ChooseCells(const RawGroup& group, double fps,
                                            const GridLayout& layout, const Quat& stand_root);

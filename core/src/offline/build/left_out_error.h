@@ -34,8 +34,8 @@ struct BlendSet {
 [[nodiscard]] std::vector<Vec3> JointPositions(const GridExample& example, const GridLayout& layout,
                                                const Skeleton& skeleton);
 
-// Measures how well sets reproduce examples outside them. Not thread-safe, because it contains
-// scratch memory.
+// Measures how well a BlendSet reproduces an example that it does not contain. Not thread-safe,
+// because it contains scratch memory.
 class LeftOutProbe {
  public:
   // `units` contains the metres per unit of each parameter.

@@ -46,8 +46,9 @@ class PoseComparison {
  public:
   PoseComparison(const Skeleton& skeleton, ConstPoseSpan stand_pose);
 
-  /// Returns the distances of corresponding joints at equal generic times. Fails with
-  /// kShapeMismatch if the numbers of poses or joints differ, or if there are no poses.
+  /// Returns the distances between corresponding joints of poses with the same index. The caller
+  /// must sample both movements at equal generic times. Fails with kShapeMismatch if the numbers of
+  /// poses or joints differ, or if there are no poses.
   [[nodiscard]] Expected<PoseError> Measure(std::span<const Pose> truth,
                                             std::span<const Pose> other);
 

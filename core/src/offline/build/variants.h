@@ -32,12 +32,12 @@ inline constexpr double kVariantToeMarginM = 0.015;
                                                       std::span<const double> units,
                                                       bool is_smooth);
 
-// Returns the times at which to sample a captured step, one per grid point, in seconds. At each
-// time, the root has covered the same fraction of its path past the standing foot as at the grid
-// point in the group's blend for the parameters of the step. A variant sampled at other times would
-// change the speed of the body, and each transition to another step would have to brake or
-// accelerate the body. If the root of the step or of the blend does not move forward throughout,
-// returns the times of the step's own grid points. `group` must have weights.
+// Returns the times at which to sample a captured step, one per grid point, in seconds. They align
+// the step with the group's blend for the same parameters: at each grid point, both roots have
+// covered the same fraction of their paths past the standing foot. A variant sampled at other times
+// would change the speed of the body, and each transition to another step would have to brake or
+// accelerate it. If one of the roots does not move forward throughout, returns the times of the
+// step's own grid points. `group` must have weights.
 [[nodiscard]] std::vector<double> TimesOfBlend(const MotionGroup& group, const GridLayout& layout,
                                                const Skeleton& skeleton,
                                                const GridExample& captured);

@@ -25,7 +25,7 @@ inline constexpr double kClipFps = 120.0;
 /// Pitch of a foot while it rolls over its ball, as fractions of its pitch at toe-off. Rates are
 /// changes per half of double support. The other foot lands at the start of double support.
 struct RollOff {
-  double heel_rise_swing;  ///< Fraction of the swing of the other foot at which the heel rises.
+  double heel_rise_swing;  ///< Fraction of the other foot's swing at which the heel starts to rise.
   double strike;           ///< Pitch when the other foot lands.
   double strike_rate;      ///< Rate when the other foot lands.
   double state;            ///< Pitch in the middle of double support.

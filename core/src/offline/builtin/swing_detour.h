@@ -26,8 +26,8 @@ template <class NearestM>
   double widest_m = 0.0;
   for (double detour_m = 0.0; detour_m < range.max_m; detour_m += range.step_m) {
     const double distance_m = nearest_m(detour_m);
-    // A longer detour must increase the distance noticeably. It does not if the feet are closest at
-    // the landing, which detours do not change.
+    // A longer detour must increase the distance noticeably. If the feet are closest at the
+    // landing, no detour does, because detours do not change the landing.
     if (distance_m <= widest_m + kSmallestGainM) continue;
     widest_m = distance_m;
     best_m = detour_m;

@@ -13,7 +13,8 @@ constexpr double kLimbEndM = 0.15;
 // A filter for noisy joint rotations: a median filter, followed by a Gaussian filter that is
 // truncated at two standard deviations.
 struct NoiseFilter {
-  // The filter applies only to joints whose angular acceleration has at least this 99th percentile.
+  // The filter applies only to joints whose 99th percentile of angular acceleration is at least
+  // this.
   double least_rad_s2;
   double median_reach_s;  // Half the length of the median's window.
   double deviation_s;     // Standard deviation of the Gaussian.

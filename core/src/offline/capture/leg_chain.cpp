@@ -31,8 +31,9 @@ bool IsHelper(const FigureShape& figure, int j) {
   return IsHelperName(figure.joints[Index(j)].name);
 }
 
-// The joints of a chain without coincident ones. Of several joints at the same place, the chain
-// contains the one that a name identifies, or else the lowest one.
+// The joints of a leg chain, one per position. Of coincident joints, the chain keeps the one whose
+// name identifies a part of the leg, preferably the ankle. If no name does, it keeps the lowest
+// joint that is not a helper.
 class Chain {
  public:
   Chain(const FigureShape& figure, const std::vector<int>& joints) : figure_(figure) {

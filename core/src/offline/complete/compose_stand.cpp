@@ -41,8 +41,8 @@ double KneeRad(const LegRig::Side& side, const LegPose& leg) {
   return Acos(glm::dot(thigh, shank) / std::sqrt(glm::dot(thigh, thigh) * glm::dot(shank, shank)));
 }
 
-// Averages the postures of steps, and their feet while the soles are flat. Does not set
-// StandParts::width_m.
+// Averages the postures of steps and, at times when soles are flat, the rotations of the ankles and
+// the heights of the balls. Does not set StandParts::width_m.
 class StandAverage {
  public:
   void AddPosture(const PostureSample& sample) {

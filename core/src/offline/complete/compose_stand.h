@@ -29,8 +29,8 @@ struct StandParts {
 [[nodiscard]] StandParts MeasureStandParts(const std::array<StrideModel, 2>& strides);
 
 /// Measures the parts of a stand in all captured steps, for libraries without level, straight
-/// strides. The trunk leans no further than in a walk, because the steps may be of another kind.
-/// Returns nullopt if there are no captured steps.
+/// strides. The steps may be of another kind, for example up stairs, so the lean of the trunk is
+/// limited as in a walk (LimitLean). Returns nullopt if there are no captured steps.
 [[nodiscard]] std::optional<StandParts> MeasureStandParts(const RawLibrary& library);
 
 /// Composes a stand pose, with the feet side by side and the knees nearly straight.

@@ -43,7 +43,7 @@ constexpr double kSwingEnd = 2.06;
 // SwungAt limits the progress of the foot to that of the captured foot. The limit fades in and out
 // during this fraction of the swing at each end.
 constexpr double kSwingFade = 0.2;
-// Size of the rounded corner where this limit begins or ceases to apply, as a fraction of the way
+// The limit is a smooth minimum. This is the width of its rounded corner, as a fraction of the way
 // between the footprints.
 constexpr double kSwingRounding = 0.02;
 // Minimum weight of the captured stride in the middle of a swing, for the rotation and the height

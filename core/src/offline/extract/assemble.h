@@ -76,8 +76,8 @@ class LibraryAssembler {
 /// Returns true if two skeletons have joints with the same names and parents, in the same order.
 [[nodiscard]] bool SameJointTree(const Skeleton& a, const Skeleton& b);
 
-/// Describes the first difference of `other` from `first`, whose name is `first_name`. Example:
-/// "its joint 3 is Neck where a.bvh has Head".
+/// Describes the first difference between the joints of `first` and `other`. The text calls `first`
+/// by the name `first_name`. Example: "its joint 3 is Neck where a.bvh has Head".
 [[nodiscard]] std::string TreeDifference(const Skeleton& first, const std::string& first_name,
                                          const Skeleton& other);
 

@@ -20,7 +20,7 @@ struct ContactOptions {
 /// A time span during which a foot is on the ground, in frames of the BodyTracks.
 struct Contact {
   FrameRange frames;
-  double ball_height_m = 0.0;  ///< Height of the resting ball during the contact.
+  double ball_height_m = 0.0;  ///< Height at which the ball of the foot rests during the contact.
 };
 
 struct FootContacts {

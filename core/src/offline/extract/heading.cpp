@@ -30,8 +30,8 @@ struct StepTime {
   double frames = 0.0;
 };
 
-// Returns the times from each heel-strike to the next one of the other foot. The times are sorted
-// and filtered by a median of three.
+// Returns the numbers of frames between successive heel-strikes of different feet, in chronological
+// order. Skips step times outside [kStepMinS, kStepMaxS] and applies a median filter of width 3.
 std::vector<StepTime> StepTimes(const FootContacts& contacts, double fps) {
   struct Strike {
     int frame;

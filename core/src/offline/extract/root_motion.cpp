@@ -14,7 +14,8 @@ namespace {
 constexpr double kLevelPercentile = 3.0;
 // The motion of each point of the feet has the weight exp(-height / kFadeM).
 constexpr double kFadeM = 0.005;
-// If all points of the feet are higher than this, the figure is in the air.
+// If all points of the feet are more than this above their resting heights, the figure is in the
+// air.
 constexpr double kAirM = 0.06;
 // Slower motion of supporting feet is sliding, not motion of the ground.
 constexpr double kSlideMin_m_s = 0.2;

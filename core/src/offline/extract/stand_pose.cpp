@@ -49,8 +49,8 @@ double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   return HorizontalDistance(pelvis, ankles) + HorizontalDistance(DVec3(*top), pelvis);
 }
 
-// Returns how far a foot is from being flat. Still feet need not be flat: people also rest on their
-// heels or toes, for example after a fall.
+// Returns how far a foot is from being flat, in metres. A foot that does not move need not be flat:
+// people also rest on their heels or toes, for example after a fall.
 double Tilt(const FootPaths& foot, int frame) {
   double tilt_m = 0.0;
   for (const std::size_t point : {FootPaths::kAnkle, FootPaths::kToeTip}) {

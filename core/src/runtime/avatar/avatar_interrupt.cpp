@@ -57,8 +57,10 @@ double AvatarSimulation::MovementEnd() const {
   const double end_s = body_.movement.duration_s();
   if (!interrupts_ || IsStartDelayed()) return end_s;
   if (std::holds_alternative<StandRequest>(queue_[queue_head_].movement)) {
-    // A stand requires a step that brings the feet together. If the current step does so, it must
-    // be completed, because no pose before its end is a standing pose.
+    // A stand begins at the end of a step that brings the feet together. The current step must be
+    // completed if it does so, because no pose before its end is a standing pose. The same applies
+    // if the feet were together before the step and the foot has not left the ground yet, because
+    // no closing step would follow.
     const bool is_stepping =
         movement_time_s_ > SwingTimesOf(group().kind, body_.movement).release_s;
     if (is_stepping ? !LandsWithFeetApart() : !is_walking_) return end_s;

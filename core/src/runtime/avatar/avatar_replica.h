@@ -96,7 +96,7 @@ class AvatarReplica {
   /// Time within the previous movement at which it ended or was interrupted when this one began.
   /// Negative if this movement did not directly follow another one.
   [[nodiscard]] double previous_end_s() const { return previous_end_s_; }
-  /// Time from the start of movement() to the last tick. Undefined if movement() is null.
+  /// Time within movement() at the last tick. Undefined if movement() is null.
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// True if layers change the displayed pose.
   [[nodiscard]] bool has_layers() const { return may_have_layers_ && body_.has_layers; }

@@ -142,8 +142,8 @@ class AvatarSimulation {
   /// All data on which the displayed pose and the next movement depend. It corresponds to pose()
   /// until the next Advance, Teleport or SetLayer.
   [[nodiscard]] const AvatarBody& body() const { return body_; }
-  /// Returns the changes of the last Advance. They include calls of Teleport and SetLayer before
-  /// it.
+  /// Returns the changes of the last Advance, including those by Teleport and SetLayer since the
+  /// previous Advance.
   [[nodiscard]] const AvatarChange& change() const { return change_; }
   /// True if a movement that begins now continues with the velocity of the previous one.
   [[nodiscard]] bool keeps_speed() const { return moved_until_s_ == time_s_; }

@@ -76,8 +76,8 @@ bool AvatarSimulation::HasGroundBeside(Foot fixed) const {
          climb_m <= std::fabs(StandingPosition(OtherFoot(fixed)).y - fixed_m);
 }
 
-// Plans a step that brings `foot` beside the other foot. Planting moves the foot there, although
-// the steps of the library end elsewhere.
+// Plans a step that brings `foot` beside the other foot. Planting moves the foot there, even if the
+// steps of the library end elsewhere.
 std::optional<RequestPlan> AvatarSimulation::PlanPlantedClosingStep(Foot foot) const {
   if (!HasGroundBeside(OtherFoot(foot))) return std::nullopt;
   const DVec3 fixed_m = StandingPosition(OtherFoot(foot));

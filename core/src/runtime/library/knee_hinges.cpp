@@ -53,7 +53,8 @@ DVec3 PlaneNormal(const Skeleton& skeleton, const LegChain& chain, const Rotatio
 
 DVec3 Unit(const DVec3& v) { return v / std::sqrt(glm::dot(v, v)); }
 
-// Returns the axis that points to the left of the foot in the stand pose.
+// Returns the axis that points to the left of the foot in the stand pose, in the frame of the hip
+// joint.
 DVec3 HingeOfStand(const Skeleton& skeleton, ConstPoseSpan stand_pose, Foot foot) {
   const Leg& leg = skeleton.leg(foot);
   std::vector<Vec3> positions(skeleton.joints.size());

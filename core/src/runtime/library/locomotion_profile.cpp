@@ -26,7 +26,7 @@ constexpr double kLeastWidthM = 0.08;
 // Examples whose feet differ in height by at most this are level.
 constexpr double kLevelM = 0.05;
 
-// Ranges of the level steps of a library.
+// Lengths and widths of the level steps of a library.
 struct StepRanges {
   double longest_m = 0.0;
   double back_m = 0.0;

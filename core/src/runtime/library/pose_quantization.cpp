@@ -23,8 +23,8 @@ constexpr double kStillWidth = 1e-4;
 // Margin for the rotations of standing avatars, which play their loop unchanged. It only has to
 // cover quantization errors.
 constexpr double kIdleMargin = 0.0022;
-// If the w of a joint falls below this, the joint may rotate in any direction and is encoded with
-// "smallest three".
+// A joint is encoded with "smallest three", which does not limit rotations, if the w of one of its
+// rotations in the library, relative to the reference, is below this.
 constexpr double kMinBoundedW = 0.4;
 // A joint whose mean rotation is below 9 degrees uses the identity as its reference. That saves the
 // encoder a multiplication and needs no more bits.

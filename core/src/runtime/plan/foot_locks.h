@@ -26,7 +26,6 @@ using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 [[nodiscard]] FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
                                     double ground_m, const Terrain* terrain);
 
-/// Returns the sole of a foot.
 [[nodiscard]] Sole SoleOf(const LegRig::Side& side);
 
 /// Returns how the ground would support a foot on a footprint.

@@ -404,7 +404,8 @@ class Planner {
     return shift * std::min(1.0, kMaxCentreShiftM / std::max(length_m, kMaxCentreShiftM));
   }
 
-  // Returns the shift that moves the root above `place_m` by the end of the movement.
+  // Returns the horizontal shift, limited to kMaxRootShiftM, that moves the root towards a position
+  // over `place_m` by the end of the movement.
   DVec3 RootShift(const DVec3& place_m) {
     const double end_s = movement_.duration_s();
     EvaluateMovement(group_, library_.layout(), movement_, end_s, cache_, pose_);

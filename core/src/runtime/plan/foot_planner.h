@@ -19,8 +19,8 @@ namespace stridewire {
 
 /// Target to which a movement should bring the feet.
 struct LandingTarget {
-  /// Request whose footprint the movement should reach exactly. If it has none, the target is given
-  /// by its `applied` parameters.
+  /// Request whose footprint the movement should reach exactly. Without a footprint, the target
+  /// follows from RequestPlan::applied.
   const RequestPlan& request;
   /// Terrain. Null: level ground, whose height follows from the library and the request.
   const Terrain* terrain;

@@ -17,8 +17,8 @@ constexpr double kFeetApartAsideM = 0.3;
 
 // Planting can distribute an error up to this size over a swing (RequestPlan::most_residual_m).
 constexpr double kMaxStartErrorM = 0.25;
-// An inserted step must reduce the cost of the request by at least kMinStepGainM for steps and by
-// kMinClosingGainM for jumps, whose cost is the distance between the feet (CostM).
+// An inserted step must reduce the cost of the request (CostM) by at least kMinStepGainM if a step
+// is requested, and by kMinClosingGainM or to 0 if a jump is requested.
 constexpr double kMinStepGainM = 0.25;
 constexpr double kMinClosingGainM = 0.03;
 
@@ -71,8 +71,8 @@ class TransitionPathFinder {
     return other;
   }
 
-  // Finds the first of up to `steps` inserted steps after which the request costs at most
-  // `max_cost_m`.
+  // Finds the first of exactly `steps` inserted steps after which the request is possible and costs
+  // at most `max_cost_m`.
   std::optional<RequestPlan> FindFirstStep(int steps, const Stance& stance,
                                            double max_cost_m) const {
     for (const Foot foot : {OtherFoot(stance.last_moved), stance.last_moved}) {
@@ -138,8 +138,8 @@ class TransitionPathFinder {
                      plan.applied.values[static_cast<std::size_t>(l)]);
   }
 
-  // Returns the cost of a request in metres. For a jump, this is the distance by which the feet are
-  // further apart than in a stand.
+  // Returns the cost of a request in metres. For a jump, this is the distance by which the feet
+  // exceed the limits of AreFeetApart.
   double CostM(const RequestPlan& plan, const Stance& stance) const {
     if (jump_ == nullptr) return plan.cost_m;
     const DVec3 apart = stance.feet.left_from_right_m - stand_.left_from_right_m;

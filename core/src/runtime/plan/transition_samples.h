@@ -38,8 +38,8 @@ class TransitionSamples {
 
   [[nodiscard]] const FootSampler& feet() const { return feet_; }
   [[nodiscard]] double time_s(std::size_t i) const { return times_s_[i]; }
-  /// Returns the index of the start of the movement without its difference pose. The next sample is
-  /// start_step_s() later.
+  /// Returns the index of the first of two samples without the difference pose. They are at the
+  /// start of the movement and start_step_s() later.
   [[nodiscard]] std::size_t blended_start() const { return blended_start_; }
   /// Returns true if the samples of the blend-in exist.
   [[nodiscard]] bool has_settle_samples() const { return blended_start_ > kSettle; }

@@ -100,7 +100,7 @@ class StepComparison {
         next_waypoint_(next_waypoint),
         effort_m_(effort_m) {}
 
-  // Compares a step with the best one so far.
+  // Plans a step, and keeps it if its score is better than the best one so far.
   void Consider(StepPlanner& planner, const WalkStance& stance, Foot moving, const WalkStep& step) {
     const auto planned = PlanTurned(planner, moving, step);
     if (!planned) return;

@@ -59,9 +59,9 @@ constexpr double kStrideS = 0.62;
 // saves at least this time.
 constexpr double kStrideMarginS = 0.3;
 
-// If the angle between an avatar's heading and its path exceeds this, a step turns by up to
-// kSpotTurn. Steps become shorter with the angle that remains after the turn. From this angle on,
-// the avatar turns on the spot.
+// If the angle between an avatar's heading and its path exceeds kSlowTurnRad, a step turns by up to
+// kSpotTurn. The larger the angle that remains after the turn, the shorter the step. If that angle
+// reaches kSlowTurnRad, the avatar turns on the spot.
 constexpr double kSlowTurnRad = 0.7;
 // The walk aims at a point behind the goal, so that it approaches the goal in a curve that ends in
 // the heading at the goal. The distance of that point from the goal is this fraction of the

@@ -47,10 +47,8 @@ class WalkSteering {
   /// the right foot. After a step, this is the distance by which the body moves in that step.
   [[nodiscard]] double BodiesApartM() const;
 
-  /// Returns the feet that may step next. Usually, this is one foot: the one that is not at the
-  /// goal yet, the foot behind along the path at the start of a walk, or the foot that did not move
-  /// last. If the feet are together and neither is at the goal, returns both, the preferred one
-  /// first.
+  /// Returns the feet that may step next. Usually, this is one foot. If the feet are together, as
+  /// in a stand, and neither is at the goal, returns both, the preferred one first.
   [[nodiscard]] std::span<const Foot> FeetToMove(std::size_t next_waypoint);
 
   /// Returns the next step of a foot. `part` scales its length, and `bend_rad` turns its direction

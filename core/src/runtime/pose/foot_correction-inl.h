@@ -45,7 +45,7 @@ struct CorrectionOf {
   Vector root_shift;  // Part of FootTrajectory::root_shift_m that is complete.
 };
 
-// Returns the fraction of a lift that is added at a fraction of the swing.
+// Returns the fraction of a lift that is added when the fraction `swing` of the swing has elapsed.
 template <typename Number>
 STRIDEWIRE_INLINE Number LiftShareOf(const LiftCurve& curve, Number swing) {
   return (Constant<Number>(1.0) -

@@ -46,8 +46,8 @@ class LayerStack {
   /// time. Ending a layer that is not playing has no effect.
   ///
   /// Errors: kNotFound if there is no such layer. kOutOfRange if a number is not finite or out of
-  /// its range. kLimitExceeded if another layer would have to start while kMaxLayers are playing.
-  /// On error nothing changes.
+  /// range. kLimitExceeded if another layer would have to start while kMaxLayers are playing. On
+  /// error, nothing changes.
   [[nodiscard]] Status Set(const MotionLibrary& library, const LayerRequest& request);
 
   /// Advances all layers by `dt_s`. Non-looping clips ease out before their end.

@@ -92,7 +92,7 @@ Quat RotationFromUp(const Vec3& normal) {
   return Normalise(Quat(1.0f + normal.y, normal.z, 0.0f, -normal.x));
 }
 
-// Returns the part of a foot's correction by which the root moves as well.
+// Returns the part of a foot's correction that also moves the root.
 DVec3 RootShare(const FootCorrection& correction) {
   return correction.root_weight * correction.offset_m + correction.root_shift_m;
 }

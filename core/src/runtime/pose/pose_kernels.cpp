@@ -149,8 +149,9 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   Mask is_short = {hn::FirstN(d, 0)};
   std::size_t next = 0;
   while (next < blend.joint_count) {
-    // If fewer joints remain than a vector holds, the last vector begins with some joints of the
-    // previous one. It computes the same results for them again, so no vector is partly empty.
+    // If fewer joints remain than a vector holds, the last vector also covers some joints of the
+    // previous one, with the same results. Only skeletons with fewer joints than a vector holds
+    // leave lanes empty.
     const std::size_t j = next + width > blend.joint_count && blend.joint_count >= width
                               ? blend.joint_count - width
                               : next;

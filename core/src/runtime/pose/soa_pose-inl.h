@@ -151,8 +151,9 @@ bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
                              LoadLanes(blend.is_inertial + lane) < half);
       }
     }
-    // Adding the difference poses makes rotations longer. `shortest` is the maximum squared length
-    // that a rotation of length kSmallestNorm can have afterwards.
+    // Blended quaternions shorter than kSmallestNorm must be detected, but lengths are measured
+    // only after the difference poses are added, which can lengthen quaternions. `shortest` is an
+    // upper bound of the squared length to which a quaternion of length kSmallestNorm can grow.
     Float shortest = kSmallestNorm * kSmallestNorm;
     if (state.is_any) shortest = shortest * Float(1.01f * kLongestSlerp * kLongestSlerp);
     if (state.is_any_inertial) {

@@ -329,7 +329,7 @@ void SoaPoseEvaluator::Prefetch(const SampleRun& run) {
 }
 
 void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs) {
-  // All poses of a block must have planted feet, or none.
+  // The poses of a block must either all have planted feet or all have none.
   for (const bool is_planted : {false, true}) {
     std::array<SampleRun, kBlock> runs;
     std::array<Pose*, kBlock> outputs;

@@ -22,8 +22,8 @@ inline constexpr double kLowerOverlap = 0.1;
 // when a limit becomes active.
 inline constexpr double kSoftM = 0.002;
 inline constexpr double kSoftGroundM = 0.006;
-// Within a horizontal distance of kNearPrintM from a footprint, soles are fully lifted out of its
-// ground plane. The lift fades to zero at kFarFromPrintM.
+// A sole below the ground plane of a footprint is lifted out of it completely within a horizontal
+// distance of kNearPrintM from the footprint. The lift fades to zero at kFarFromPrintM.
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
 // If planting lifts a sole out of the ground, the root rises as well, but by less than this. If it

@@ -25,8 +25,8 @@ struct FootSupport {
 
 /// Computes the support of a foot whose ball is above (x, z) and whose heading is `heading_rad`.
 /// The sole is sampled at 10 x 5 points, including its corners and the ball. The plane is fitted by
-/// least squares to the points that are connected to the ball without a rise or drop steeper than
-/// 45 degrees, with a tolerance of 5 mm. At an edge, the plane therefore stays on the ball's side:
+/// least squares to the points that can be reached from the ball without a rise or drop steeper
+/// than 45 degrees, with a tolerance of 5 mm. At an edge, the plane stays on the ball's side:
 ///
 ///          ball                 gap_m: height of the edge
 ///   =========o==------          carried: 0.7

@@ -282,7 +282,7 @@ double Terrain::FieldHeight(double x, double z) const {
   return near * (1.0 - p.t) + far * p.t;
 }
 
-// `area` must be inside the field. A bilinear patch has its maximum over an axis-parallel rectangle
+// `area` must be inside the field. A bilinear patch has its maximum over an axis-aligned rectangle
 // at a corner of that rectangle. It is therefore sufficient to sample the corners of the part of
 // `area` in each cell. These are the points of the grid that consists of the borders of `area` and
 // the sample lines between them.

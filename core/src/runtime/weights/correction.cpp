@@ -144,8 +144,9 @@ class WeightStep {
     SetSum(total_, out);
   }
 
-  // Writes the change of the weights [n] in the direction of `variation`, without the part that
-  // changes the quantities in the rows of `slopes` or the sum of the weights.
+  // Writes the change of the weights [n] in the direction of `variation`, without the component
+  // that would change the sum of the weights or the quantities whose derivatives are the rows of
+  // `slopes`.
   void Vary(const StrideVariation& variation, std::span<double> change) const {
     for (std::size_t e = 0; e < n_; ++e) change[e] = variation.WeightDirection(e) * weights_[e];
     Vector y{};

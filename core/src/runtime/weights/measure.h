@@ -11,8 +11,8 @@ namespace stridewire {
 /// Returns a(p): the actual parameters of a movement, measured on the first and last pose of the
 /// blend (paper, Section 4), in the order of its group. For steps, these are the foot vectors in
 /// the heading frames of start and end, and the heading change. For jumps, they are the forward and
-/// upward displacement of the midpoint between the balls. `pose` is scratch memory with one
-/// rotation per joint. Never allocates.
+/// upward displacement of the midpoint between the balls, and the heading change. `pose` is scratch
+/// memory with one rotation per joint. Never allocates.
 [[nodiscard]] ParameterValues MeasureMovement(const MotionLibrary& library,
                                               const Movement& movement, GridCache& cache,
                                               PoseSpan pose);
