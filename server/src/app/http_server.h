@@ -38,8 +38,8 @@ struct HttpAnswer {
   [[nodiscard]] std::string_view bytes() const { return shared_body ? *shared_body : body; }
 };
 
-/// A small HTTP/1.1 server. It supports GET and HEAD for registered pages, and one path that
-/// becomes a WebSocket. The header and the body of a request have at most 8 KiB each. A request
+/// A small HTTP/1.1 server. It supports GET and HEAD for registered pages, and WebSocket upgrades
+/// for one path. The header and the body of a request have at most 8 KiB each. A request
 /// must be received within 10 s, and a response must be sent within 60 s. The server runs on one
 /// thread, except for slow pages, which have their own thread. At most 16 requests for slow pages
 /// may be waiting or in progress.

@@ -85,7 +85,8 @@ struct ConfigKey {
   std::function<Status(Config&, std::string_view)> set;
   std::function<std::string(const Config&)> get;
 
-  /// Sets the value from text. The error contains `where` and the allowed range.
+  /// Sets the value from text. The error contains `where` and, if a number is out of range, the
+  /// allowed range.
   [[nodiscard]] Status Set(Config& config, std::string_view value, std::string where) const;
 
   [[nodiscard]] std::string option() const;  ///< "--tick-hz"

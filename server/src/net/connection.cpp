@@ -76,7 +76,7 @@ Expected<std::optional<protocol::FrameView>> Connection::NextFrame() {
   return reader_.Next(unread_);
 }
 
-// A WebSocket message must contain exactly one frame, in any number of fragments.
+// A WebSocket message from a client must contain exactly one frame, in any number of fragments.
 Expected<std::optional<protocol::FrameView>> Connection::NextFrameOfMessages() {
   if (is_text_) {
     close_code_ = CloseCode::kNotBinary;

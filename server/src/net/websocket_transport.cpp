@@ -140,7 +140,7 @@ class WebSocketTransport final : public Transport {
   websocket::stream<PortableSocket> stream_;
   std::optional<UpgradeRequest> request_;  // Set until the request has been answered.
   std::span<const SharedFrame> unsent_;
-  std::size_t joined_frames_ = 0;            // The last frames of unsent_, sent as one message.
+  std::size_t joined_frames_ = 0;  // Number of frames at the end of unsent_ that form one message.
   std::vector<asio::const_buffer> buffers_;  // The frames of the message that is being sent.
   bool is_pinging_ = false;
 };

@@ -60,8 +60,8 @@ void InterestTracker::Update(const std::shared_ptr<World>& world) {
   for (std::size_t mode = 0; mode < kSentModes.size(); ++mode) {
     const PoseInterest& before = sent->second.poses[mode];
     is_same &= before.interval == interest.poses[mode].interval;
-    // The previous selection stays valid until the next SendChangedSelections. It lacks only
-    // avatars and regions that were selected after the last one.
+    // Selections are sent only by SendChangedSelections. Until then, the previous one is used. It
+    // lacks only avatars and regions that were selected after it was sent.
     interest.poses[mode].avatars = before.avatars;
     interest.poses[mode].regions = before.regions;
   }

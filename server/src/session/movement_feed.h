@@ -38,7 +38,8 @@ class MovementFeed {
   /// as gone, up to a message size of `max_bytes`. The rest are reported with the next step.
   [[nodiscard]] protocol::Movements Select(const protocol::Movements& step, std::size_t max_bytes);
 
-  /// Must be called when movements were dropped: the client's avatars are then invalid.
+  /// Must be called when movements were dropped. The client's copies of the avatars are then
+  /// invalid.
   void SetLost();
   [[nodiscard]] bool is_lost() const { return is_lost_; }
   /// Continues a lost feed. All avatars need states.

@@ -24,7 +24,7 @@ namespace stridewire::server {
 ///                          |  +---------Attach-----------+
 ///                          +---Goodbye, or the client cannot resume------------------> ended
 ///
-/// Limits bounds the memory of a session, whatever the client does.
+/// The configured limits (Limits) bound the memory of a session, whatever the client does.
 class Session : private ConnectionHandler {
  public:
   using Clock = Connection::Clock;
@@ -83,7 +83,8 @@ class Session : private ConnectionHandler {
   void Inspect(const protocol::InspectAvatar& message);
   void SendLibraryPiece(const protocol::FetchLibrary& message);
 
-  /// Sends a fatal error and closes the connection. The session waits for its client.
+  /// Sends a fatal error and closes the connection. The session then waits for its client to
+  /// connect again.
   void Fail(protocol::StatusCode code, std::string text, protocol::Seq seq = 0);
   void Detach();
   void UpdatePause();

@@ -77,8 +77,9 @@ class Subscriptions {
   [[nodiscard]] std::optional<RegionFilter> FilterOf(WorldId world, protocol::PoseMode mode) const;
 
   [[nodiscard]] Share ShareOf(const PoseDelivery& delivery) const;
-  /// Returns the rows of a delivery with Share::kSubset, valid until the next call of any function.
-  /// Returns nullopt if no row has a pose and the previous batch was empty as well.
+  /// Returns the rows that the session sends of a delivery with Share::kSubset. They are valid
+  /// until the next call of any function. Returns nullopt if no row has a pose and the previous
+  /// batch was empty as well.
   [[nodiscard]] std::optional<std::span<const std::uint32_t>> PickRows(
       const PoseDelivery& delivery);
   /// Returns the region of this world if it has a ring of this mode, otherwise null.

@@ -7,7 +7,7 @@
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/terrain.h"
 
-/// Conversions between the types of the runtime and those of the protocol, which do not include
+/// Conversions between the types of the runtime and those of the protocol, which do not depend on
 /// each other.
 namespace stridewire::server {
 

@@ -148,8 +148,9 @@ class EncodedPoseCache {
     return state.kind == SlotState::kConstant ||
            (state.kind == SlotState::kTimed && PoseIndex(state) < state.count);
   }
-  /// Schedules the evaluation of a movement that is at `time_s`, for this step and some of the
-  /// following. The movement must exist until FinishStep.
+  /// Schedules the evaluation of a movement for this step and possibly some later steps. `time_s`
+  /// is the time of the movement at this step. The movement must exist and must not change until
+  /// FinishStep.
   void Schedule(Slot& slot, std::uint64_t revision, const Movement& movement, double time_s);
   /// Encodes a copy of `pose` and stores it for this step or, if `is_constant`, for all steps.
   void Store(Slot& slot, std::uint64_t revision, ConstPoseSpan pose, bool is_constant);

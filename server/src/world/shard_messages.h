@@ -119,8 +119,9 @@ struct StatesRequest {
   int from_shard = 0;  ///< The shard of the session.
   SessionId session = 0;
   std::uint32_t nonce = 0;
-  AvatarId first = 0;            ///< Smallest id whose state is sent.
-  std::size_t enough_bytes = 0;  ///< The shard stops after the state that exceeds this size.
+  AvatarId first = 0;  ///< Smallest id whose state is sent.
+  /// The shard stops after the state with which the total size exceeds this.
+  std::size_t enough_bytes = 0;
   /// Ascending ids of the avatars whose states are requested; null: all avatars.
   std::shared_ptr<const std::vector<AvatarId>> avatars;
 };

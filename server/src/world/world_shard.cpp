@@ -404,7 +404,8 @@ protocol::Movements WorldShard::EmptyMovements() const {
           .server_time_s = clock_.TickTime(tick_)};
 }
 
-// True if one more record of the maximum size could exceed the frame limit.
+// Returns true if the message contains kMaxItems avatars, or if one more record of the maximum size
+// could exceed the frame limit.
 bool WorldShard::IsFull(const protocol::Movements& message) const {
   constexpr std::size_t kOverheadBytes = 256;
   constexpr std::size_t kAvatarBytes = 9;  // Size of an avatar's id, flags and end.

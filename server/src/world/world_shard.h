@@ -78,7 +78,7 @@ class WorldShard {
   [[nodiscard]] bool TakeMovements(std::uint64_t tick, MovementDelivery& delivery);
 
   /// Encodes the states of avatars after the last tick. Stops after the state with which the size
-  /// exceeds `request.enough_bytes`, so the result contains at least one state.
+  /// exceeds `request.enough_bytes`, or when the message is full.
   [[nodiscard]] StatesResult States(const StatesRequest& request, protocol::Encoder& encoder) const;
 
   /// Describes an avatar after `tick`, for InspectAvatar. Parameters of examples are omitted if
