@@ -85,7 +85,7 @@ bool ReadComponents(BitReader& reader, const CompactJoint& joint, Quat& q) {
   return true;
 }
 
-// Assigns the bits of consecutive numbers to words of 32 bits.
+// Assigns the bits of consecutive numbers to 32-bit words.
 class WordPlan {
  public:
   void Put(std::size_t row, int bits) {

@@ -70,8 +70,8 @@ void WriteFrameHeader(const FrameHeader& header, std::span<std::byte, kFrameHead
     const FrameLimits& limits = {});
 
 /// Parses one whole frame, for example a WebSocket message. `bytes` must outlive the returned view.
-/// Fails with the errors of ReadFrameHeader, with kMalformed if the payload has another size than
-/// the header states, and with kInvalidArgument if `bytes` is not aligned to 8 bytes.
+/// Fails with the errors of ReadFrameHeader, with kMalformed if the size of the payload differs
+/// from that in the header, and with kInvalidArgument if `bytes` is not aligned to 8 bytes.
 [[nodiscard]] Expected<FrameView> ParseFrame(std::span<const std::byte> bytes, Sender sender,
                                              const FrameLimits& limits = {});
 

@@ -53,7 +53,7 @@ enum class PoseDetail : std::uint8_t {
 /// changes by at most 2^-15 m (0.031 mm). From 512 m on, every float32 is a multiple of a step, so
 /// it does not change.
 inline constexpr float kRootStepsPerM = 16384.0f;
-/// Largest coordinate of a quantised root position in metres.
+/// Maximum magnitude of a coordinate of a quantised root position, in metres.
 inline constexpr float kMaxRootM = 131'071.0f;
 
 /// Largest error of a quantised rotation in radians. The error of a component is at most 2.2e-5.
@@ -86,20 +86,20 @@ inline constexpr float kUnitTolerance = 1e-3f;
 /// content of `out` is unspecified. Error codes:
 ///   kShapeMismatch  the size of `out` is not PoseBytes(mode, rotations.size())
 ///   kOutOfRange     a number is not finite, a length deviates from 1 by more than kUnitTolerance,
-///                   or a quantised root exceeds kMaxRootM; `index` is the joint of a rotation, or
-///                   the axis (0 to 2) in which the root is too far away
+///                   or the magnitude of a quantised root coordinate exceeds kMaxRootM; `index` is
+///                   the joint of a rotation, or the axis (0 to 2) of that coordinate
 ///   kUnsupported    another mode
 [[nodiscard]] Status EncodePose(PoseMode mode, const Vec3& root_position_m,
                                 std::span<const Quat> rotations, std::span<std::byte> out);
 
 /// Decodes a full or quantised pose. `in` needs no alignment. Never allocates. Quantised
-/// quaternions are unit to float32 precision; full ones are returned unchanged. Fails with the
-/// errors of EncodePose, and with kMalformed for quantised bits that no encoder writes.
+/// quaternions have unit length to float32 precision; full ones are returned unchanged. Fails with
+/// the errors of EncodePose, and with kMalformed for quantised bits that no encoder writes.
 [[nodiscard]] Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_position_m,
                                 std::span<Quat> rotations);
 
 /// Decodes the root position from the first 12 bytes of a quantised or compact pose. Fails with
-/// kOutOfRange if a coordinate exceeds kMaxRootM.
+/// kOutOfRange if the magnitude of a coordinate exceeds kMaxRootM.
 [[nodiscard]] Status DecodeRoot(std::span<const std::byte, 12> in, Vec3& root_position_m);
 
 }  // namespace stridewire::protocol

@@ -15,8 +15,8 @@ enum class StatusCode : std::uint16_t {
   kUnsupported = 102,
   kVersionMismatch = 103,
   kUnauthorised = 104,  ///< The auth token is missing or does not grant enough rights.
-  /// An observer sent a command for avatars, or the session would have a subscription with a region
-  /// and another subscription to the same world.
+  /// An observer sent a command for avatars, or an Observe violated the rule that a subscription
+  /// with a region must be the session's only one to that world.
   kNotAllowed = 105,
   kNotJoined = 106,
   kNoSuchWorld = 107,
@@ -33,7 +33,7 @@ enum class StatusCode : std::uint16_t {
   /// The request was cancelled or replaced, or its avatar was removed.
   kDropped = 116,
   // Codes 200 to 299: the data is invalid.
-  kMalformed = 200,   ///< The bytes violate the standard.
+  kMalformed = 200,   ///< The bytes violate the protocol standard (STANDARD.md).
   kNoMovement = 201,  ///< The library has no such movement or layer.
   // Codes 300 to 399: the network failed.
   kTimeout = 300,  ///< Nothing was received for longer than the timeout.
