@@ -10,7 +10,7 @@ import type {AvatarSelection, WorldPane} from './world_pane.js';
 /** The parts of the page that commands use. */
 export interface CommandHost {
   selection(): AvatarSelection | null;
-  /** The world that receives commands. */
+  /** The pane of the world that receives commands, if any. */
   commandedPane(): WorldPane | null;
   /** Selects an avatar; 0 clears the selection. */
   select(pane: WorldPane | null, avatar: number): void;
@@ -273,7 +273,10 @@ export class AvatarCommands {
     }
   }
 
-  /** The targets and their pane. If there are none, notifies the user and returns null. */
+  /**
+   * Returns the avatars that receive a command, and their pane. If there are none, notifies the
+   * user and returns null.
+   */
   private addressees(): {pane: WorldPane; avatars: number[]} | null {
     const pane = this.host.commandedPane();
     const avatars = this.targets();

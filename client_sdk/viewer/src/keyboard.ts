@@ -13,7 +13,10 @@ export interface KeyTargets {
   readonly playbackControls: PlaybackControls;
   selectNext(step: number): void;
   toggleFollow(): void;
-  /** Cancels the current input of the user or, if there is none, clears the selection. */
+  /**
+   * Discards a pending walk. If there is none, deactivates the active tool. Without an active tool,
+   * clears the selection.
+   */
   escape(): void;
   spawn(): void;
   showHelp(): void;

@@ -64,7 +64,10 @@ const longestRetryMs = 240_000;
 const smallCrowd = 24;
 const coarsestForSmallCrowd = 3;
 
-/** Returns the level with which a software renderer starts, the finest that is chosen for it. */
+/**
+ * Returns the level at which automatic selection starts with a software renderer. It never selects
+ * a finer level.
+ */
 export function initialSoftwareLevel(avatars: number): number {
   return avatars <= 3 ? 1 : avatars <= smallCrowd ? 2 : avatars <= 120 ? 4 : 5;
 }

@@ -323,7 +323,7 @@ export interface World {
   /** The ground of the world. Null if it is flat at height 0. When the terrain changes, a new
    * object replaces this one. */
   readonly terrain: Terrain | null;
-  /** The server's first reply to joining. */
+  /** The reply to `joinWorld`. It does not change if the client joins again after a reconnect. */
   readonly joined: Promise<Reply>;
 
   // Commands wait until the world is joined. Except `observe` and `leave`, they fail with `closed`
@@ -384,7 +384,8 @@ export interface WorldListeners {
   state: (state: WorldState) => void;
   /**
    * Called when the server dropped data because the client reads too slowly. Both numbers are
-   * totals since joining.
+   * totals since joining. After dropped events, end the observation of a region and observe it
+   * again, because reports of avatars that entered or left it may be missing.
    */
   lagging: (droppedBatches: number, droppedEvents: number) => void;
 }

@@ -31,7 +31,7 @@ namespace {
 constexpr std::uint32_t kWorld = 3;
 constexpr double kTickS = 1.0 / 60.0;
 
-/// FNV-1a over words of 32 bits.
+/// FNV-1a over 32-bit words.
 class Hash {
  public:
   void Add(std::uint32_t word) { value_ = (value_ ^ word) * 16777619u; }

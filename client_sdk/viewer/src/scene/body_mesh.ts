@@ -222,7 +222,8 @@ function buildTrunk(builder: MeshBuilder, parts: BodyParts, segments: number): v
   const span = Math.max(shoulderY - hipY, 0.05 * h);
   const y = (s: number): number => hipY + s * span;
   const table: [number, number, number, number, number][] = [
-    // Columns: height, half width, half depth, forward offset, region.
+    // Columns: height, half width and half depth in metres, forward offset as a fraction of the
+    // body's height, region.
     [y(0) - 0.052 * h, 0.03 * h, 0.03 * h, -0.004, Region.trousers],
     [y(0) - 0.036 * h, hips * 0.82, 0.055 * h, -0.006, Region.trousers],
     [y(0.0), hips, 0.066 * h, -0.006, Region.trousers],

@@ -14,7 +14,7 @@ function objects<T extends object>(list: readonly T[], name: string): T[] {
                     (entry: T, at) => ({...check.object(entry, at) as T}));
 }
 
-/** Calls `nextId` for the id of each request that has none. */
+/** Calls `nextId` to assign an id to each request without one. */
 export function request(items: readonly MovementRequest[], nextId: () => bigint): Draft {
   return {
     type: 'Request',
