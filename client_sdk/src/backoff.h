@@ -5,9 +5,9 @@
 
 namespace stridewire::client {
 
-/// Delays between attempts to connect. The first delay is kFirstS, and every attempt doubles it up
-/// to kLongestS. Each delay is shortened by a random fraction of up to kJitter, so that the
-/// clients of a restarted server do not reconnect all at once (STATE_MACHINE.md, "Timeouts").
+/// Delays between attempts to connect. The first delay is kFirstS. Each further delay is twice the
+/// previous one, up to kLongestS. Each is shortened by a random fraction of up to kJitter, so that
+/// the clients of a restarted server do not reconnect all at once (STATE_MACHINE.md, "Timeouts").
 class Backoff {
  public:
   static constexpr double kFirstS = 0.1;

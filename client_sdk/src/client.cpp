@@ -1,4 +1,4 @@
-// Functions of the C API for the life of a client, its events and its statistics.
+// Functions of the C API for the lifecycle, the events and the statistics of a client.
 
 #include <algorithm>
 #include <chrono>

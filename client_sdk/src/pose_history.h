@@ -115,8 +115,8 @@ class PoseHistory {
   /// Returns the index of the oldest pose with a tick above `tick`, if any.
   [[nodiscard]] std::optional<std::size_t> FirstAfterTick(std::uint64_t tick) const;
 
-  /// Returns true if the next pose cannot continue the displayed motion, because the display has
-  /// stopped after the newest pose, or because the displayed poses are no longer stored.
+  /// Returns true if the next pose cannot continue the displayed motion, because the extrapolation
+  /// of the newest pose has ended, or because the displayed poses are no longer stored.
   [[nodiscard]] bool IsInterrupted() const;
 
   /// Changes the segment of a stored pose.
@@ -184,7 +184,8 @@ class PoseHistory {
   [[nodiscard]] MovementTime MovementAt(std::size_t i, double time_s) const;
   void EvaluateMovement(const MovementTime& at, Vec3& root_position_m,
                         std::span<Quat> rotations) const;
-  /// Returns the neighbours of poses `i` and `i` + 1 for interpolation.
+  /// Returns the indices of the pose before `i` and of the pose after `i` + 1, for interpolation. A
+  /// missing one is replaced with `i` or `i` + 1.
   [[nodiscard]] std::pair<std::size_t, std::size_t> NeighboursOf(std::size_t i) const;
   [[nodiscard]] Curve FindCurve(double time_s) const;
   /// Adds the poses that the curve needs to the evaluator.
@@ -220,8 +221,8 @@ class PoseHistory {
   struct Correction {
     enum class State : std::uint8_t {
       kNone,
-      kPending,  ///< The members below are the pose displayed at `start_s`.
-      kActive,   ///< They are the difference of that pose from the curve.
+      kPending,  ///< The members below contain the pose displayed at `start_s`.
+      kActive,   ///< They contain the difference of that pose from the curve.
     };
     State state = State::kNone;
     double start_s = 0.0;

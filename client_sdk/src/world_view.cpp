@@ -233,7 +233,8 @@ void WorldView::PushEvaluated(Track& track, std::uint16_t shard, const PoseStamp
     // The movement that continued has ended before the tick of this pose.
     const ShardTicks& ticks = *track.continued.ticks;
     const bool has_tick = &ticks == ticks_ && ticks.at(ticks.count - 1).tick == stamp.tick;
-    Flush(track, ticks.count - (has_tick ? 1 : 0));  // Needs the previous movement.
+    // Flush evaluates `track.movement`, so it must precede the lines that replace this movement.
+    Flush(track, ticks.count - (has_tick ? 1 : 0));
     track.continued = {};
   }
   if (stamp.discontinuity) track.movement = nullptr;

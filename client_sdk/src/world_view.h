@@ -30,8 +30,8 @@ struct PoseBudget {
 struct DisplayCounts {
   std::uint64_t poses = 0;
   std::uint64_t extrapolated = 0;
-  /// Poses that were displayed for times after the newest received pose, when the extrapolated
-  /// motion had already stopped.
+  /// Poses that were displayed for times after the newest received pose without extrapolation,
+  /// because the extrapolated motion had stopped or because there was no motion to extrapolate.
   std::uint64_t held = 0;
 
   void Add(const PoseHistory::Sampled& sampled, bool is_after_newest) {
@@ -186,7 +186,7 @@ class WorldView : public PoseSink {
   struct Continued {
     const PlayedMovement* movement = nullptr;  ///< Null: the history contains all poses.
     const ShardTicks* ticks = nullptr;
-    MovementPoint sampled;  ///< Tick from which SampleAll computes the time of the movement.
+    MovementPoint sampled;  ///< Tick from which SampleAll counts forward to the sampled tick.
     MovementPoint stored;   ///< Newest tick in the history.
     // Copies of data of the movement: the original is usually not in the processor's cache.
     EvaluationBatcher::Similarity similarity;
@@ -281,8 +281,8 @@ class WorldView : public PoseSink {
   void RecordEvaluated(const protocol::Movements& movements);
   void EncodeBlock(const protocol::CompactCodec& codec);
 
-  /// Must be called after the last part of a batch. Unless the batch is partial, marks the avatars
-  /// of its shard and mode as gone that none of its parts contained.
+  /// Must be called after the last part of a batch. Unless the batch is partial, marks every avatar
+  /// with the batch's shard and mode as gone if no part of the batch contained it.
   void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
   /// Erases avatars that have been gone for longer than kKeepGoneS.
   void EraseGone(double time_s);

@@ -288,7 +288,9 @@ typedef enum stridewire_event_type {
   /// Uses world, command, item_index, avatar, request_id, status, text. Reports an item that the
   /// server refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
   STRIDEWIRE_EVENT_ITEM = 7,
-  /// Uses world, dropped_batches, dropped_events. This client reads too slowly.
+  /// Uses world, dropped_batches, dropped_events. The server has dropped messages because this
+  /// client reads too slowly. If dropped_events is not 0, events of avatars that entered or left an
+  /// observed region may be missing. End such a subscription and observe the region again.
   STRIDEWIRE_EVENT_LAGGING = 8,
   /// Uses status, text, and command and world if they are known. Reports an error that the server
   /// has sent without ending the connection, or the failure of a command with which the client
@@ -532,7 +534,8 @@ typedef struct stridewire_playout {
   /// Number of poses that were sampled after the newest pose and extrapolated from it. The motion
   /// slows down and stops within 0.25 s.
   uint64_t extrapolated_poses;
-  /// Number of poses that were sampled after the extrapolated motion had stopped.
+  /// Number of poses that were sampled after the newest pose without extrapolation, because the
+  /// extrapolated motion had stopped or because there was no motion to extrapolate.
   uint64_t held_poses;
   uint64_t jumps;  ///< Jumps of the render time within a session.
 } stridewire_playout;

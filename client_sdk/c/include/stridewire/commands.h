@@ -91,8 +91,8 @@ typedef struct stridewire_movement {
   /// allows, see `speed_m_s` of stridewire_event.
   double speed_m_s;
   stridewire_interrupt interrupt;
-  /// Step: 1 rejects the step unless the foot can land exactly on the requested footprint. Not
-  /// together with `allow_nearest`.
+  /// Step: 1 rejects the step unless the foot can land exactly on the requested footprint. Must not
+  /// be combined with `allow_nearest`.
   uint8_t exact_only;
   /// Step, jump: 1 plays the nearest movement of the library, however far it is from the request. 0
   /// rejects the request if its place would be missed by more than 0.2 m, or its direction or
@@ -176,7 +176,7 @@ typedef enum stridewire_pose_detail {
 
 /// A ring of a region. The server sends the poses of the avatars in it every `every_n_ticks` ticks.
 typedef struct stridewire_rate_ring {
-  /// Outer radius. It must be above 0 and above the outer radius of the previous ring.
+  /// Outer radius. Must exceed 0 and the outer radius of the previous ring.
   double to_m;
   uint16_t every_n_ticks;  ///< 1 to 3600.
 } stridewire_rate_ring;
