@@ -119,8 +119,8 @@ UpperBody FindUpperBody(const Skeleton& skeleton, std::span<const Vec3> position
     return static_cast<std::size_t>(skeleton.joints[j].parent);
   };
   const auto side_m = [&](std::size_t j) { return positions[j].x - positions[0].x; };
-  // The head is the highest joint near the middle of the body. A distance to the side counts like a
-  // height that is lower by twice that distance.
+  // The head is the highest joint near the middle of the body: twice the distance to the side is
+  // subtracted from the height.
   std::size_t head = 0;
   const auto height = [&](std::size_t j) { return positions[j].y - 2.0f * std::fabs(side_m(j)); };
   for (std::size_t j = 1; j < joints; ++j) {

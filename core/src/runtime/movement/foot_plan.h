@@ -55,8 +55,8 @@ struct FootTrajectory {
   /// Horizontal offset in the middle of the swing, for passing the other foot and the edges of
   /// treads.
   DVec3 mid_swing_offset_m = DVec3(0.0);
-  /// Fraction of the foot's correction by which the root moves as well. The fractions of both feet
-  /// sum to 1.
+  /// Fraction of the foot's correction that also moves the root. The fractions of both feet sum to
+  /// 1.
   double root_weight = 0.0;
   /// Additional shift of the root. It increases over the movement and is complete at its end.
   DVec3 root_shift_m = DVec3(0.0);

@@ -180,7 +180,7 @@ struct SoaCorrection {
   SoaVec3 offset;
   Float swing;
   SoaQuat turn;  // Rotation of the foot in world axes.
-  SoaVec3 root;  // Part of the correction by which the root moves as well.
+  SoaVec3 root;  // Part of the correction that also moves the root.
 };
 
 HWY_INLINE SoaCorrection CorrectFoot(const PlanCommon& common, const SoaTrajectory& trajectory,

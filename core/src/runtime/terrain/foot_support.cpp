@@ -38,8 +38,8 @@ class SolePoints {
   [[nodiscard]] auto end() const { return points_.end(); }
   [[nodiscard]] static constexpr int size() { return kRows * kColumns; }
 
-  // Marks the points that are connected to the ball by slopes of at most kMaxSlope. Passes over all
-  // points until nothing changes.
+  // Marks the points that can be reached from the ball over slopes of at most kMaxSlope. Passes
+  // over all points until nothing changes.
   void Spread() {
     ball().is_reached = true;
     for (bool is_changed = true; is_changed;) {

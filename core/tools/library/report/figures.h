@@ -70,8 +70,8 @@ struct ErrorFigureInput {
 [[nodiscard]] Figure TimingFigure(const MotionLibrary& library, int group_index,
                                   const FigureAxes& axes);
 
-// Draws a synthesized walk from the side and from above, with the positions where its steps were
-// requested to land (paper, Figure 4).
+// Draws a synthesized walk from the side and from above, with the requested landing positions of
+// its steps (paper, Figure 4).
 [[nodiscard]] Expected<Figure> WalkFigure(const std::shared_ptr<const MotionLibrary>& library,
                                           const std::string& name, const std::string& caption,
                                           std::span<const MovementRequest> requests);
