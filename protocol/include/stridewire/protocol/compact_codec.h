@@ -133,8 +133,9 @@ class CompactCodec {
   };
 
   /// Encodes the poses of a block, which must have joint_count() joints. A pose does not fit if a
-  /// rotation is outside the range of its quantization, the root exceeds kMaxRootM, a number is not
-  /// finite, or the length of a quaternion deviates from 1 by more than 1e-5.
+  /// rotation is outside the range of its quantization, the magnitude of a coordinate of the root
+  /// exceeds kMaxRootM, a number is not finite, or the length of a quaternion deviates from 1 by
+  /// more than 1e-5.
   void Encode(Block& block) const;
   /// Encodes poses of the caller instead of those that Add has added. Get does not return them.
   void Encode(const SoaPoses& poses, Block& block) const;
