@@ -159,9 +159,9 @@ namespace Stridewire
         /// REPLY.</summary>
         Item = 7,
         /// <summary>Uses world, dropped_batches, dropped_events. The server has dropped messages
-        /// because this client reads too slowly. If dropped_events is not 0, events of avatars that
-        /// entered or left an observed region may be missing. End such a subscription and observe
-        /// the region again.</summary>
+        /// because this client reads too slowly. If dropped_events has increased, events of avatars
+        /// that entered or left an observed region may be missing. End such a subscription and
+        /// observe the region again.</summary>
         Lagging = 8,
         /// <summary>Uses status, text, and command and world if they are known. Reports an error
         /// that the server has sent without ending the connection, or the failure of a command with

@@ -289,8 +289,8 @@ typedef enum stridewire_event_type {
   /// server refused, or the id that it chose for a spawned avatar. Precedes the REPLY.
   STRIDEWIRE_EVENT_ITEM = 7,
   /// Uses world, dropped_batches, dropped_events. The server has dropped messages because this
-  /// client reads too slowly. If dropped_events is not 0, events of avatars that entered or left an
-  /// observed region may be missing. End such a subscription and observe the region again.
+  /// client reads too slowly. If dropped_events has increased, events of avatars that entered or
+  /// left an observed region may be missing. End such a subscription and observe the region again.
   STRIDEWIRE_EVENT_LAGGING = 8,
   /// Uses status, text, and command and world if they are known. Reports an error that the server
   /// has sent without ending the connection, or the failure of a command with which the client
