@@ -187,7 +187,7 @@ class Playout:
     newest_age_s: float  #: Server time that has passed since the newest pose message.
     displayed_poses: int  #: Number of sampled poses.
     extrapolated_poses: int  #: Poses extrapolated beyond the newest received one.
-    held_poses: int  #: Poses sampled after the extrapolation had stopped.
+    held_poses: int  #: Poses sampled after the newest one without extrapolation.
 
 
 @dataclass(frozen=True)
