@@ -58,8 +58,8 @@ class PoseSink {
 /// - If a message of changes follows the previous message, the set applies its records. After the
 ///   last part of a step, it advances all avatars of the shard by one tick.
 /// - A message of states contains the complete states of avatars that the client does not know yet.
-/// - If a message is missing or invalid, the set discards all avatars of the shard until the server sends
-///   their states.
+/// - If a message is missing or invalid, the set discards all avatars of the shard until the server
+///   sends their states.
 ///
 /// Used by the client library and by stridewire-load. Not thread-safe.
 class ReplicaSet {
