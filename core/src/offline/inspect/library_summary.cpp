@@ -196,8 +196,12 @@ class Summarizer {
   std::set<std::pair<std::string, bool>> seen_;
 };
 
-constexpr const char* kMirrorAdvice =
-    "Add the option --mirror to the build, or record these movements, too.";
+// Returns the advice for movements that the library contains on one side only.
+std::string OtherSideAdvice(const LibrarySummary& summary) {
+  return summary.steps.mirrored > 0
+             ? "Record these movements, too."
+             : "Add the option --mirror to the build, or record these movements, too.";
+}
 
 // Collects the movements that the library lacks on one side or on both.
 class MissingFinder {
@@ -214,7 +218,7 @@ class MissingFinder {
       summary_.missing.push_back({what, record});
       return;
     }
-    summary_.missing.push_back({what + " " + names[has[0] ? 1 : 0], kMirrorAdvice});
+    summary_.missing.push_back({what + " " + names[has[0] ? 1 : 0], OtherSideAdvice(summary_)});
   }
 
  private:
@@ -241,7 +245,7 @@ void FindMissing(LibrarySummary& summary) {
   MissingFinder finder(summary);
   if (!summary.has_steps_of(Foot::kLeft) || !summary.has_steps_of(Foot::kRight)) {
     const bool has_left = summary.has_steps_of(Foot::kLeft);
-    summary.missing.push_back({"steps " + feet[has_left ? 1 : 0], kMirrorAdvice});
+    summary.missing.push_back({"steps " + feet[has_left ? 1 : 0], OtherSideAdvice(summary)});
   }
   finder.Check(summary.starts, "starts", feet,
                "Record walks that begin in a stand with the feet side by side.");

@@ -76,6 +76,17 @@ TEST(LibrarySummary, NamesTheMissingSideAndTheOptionThatAddsIt) {
                                       Field(&MissingAbility::advice, HasSubstr("--mirror")))));
 }
 
+TEST(LibrarySummary, DoesNotAdviseToMirrorAMirroredLibrary) {
+  RawLibrary raw = Without(MovementKind::kStepRight);
+  for (RawGroup& group : raw.groups) {
+    for (RawExample& example : group.examples) example.mirrored = true;
+  }
+  const LibrarySummary summary = Summarize(*Build(raw));
+  EXPECT_THAT(summary.missing, Not(IsEmpty()));
+  EXPECT_THAT(summary.missing,
+              testing::Each(Field(&MissingAbility::advice, Not(HasSubstr("--mirror")))));
+}
+
 TEST(LibrarySummary, NamesTheRecordingThatAddsAMovement) {
   const LibrarySummary summary = Summarize(*Build(Without(MovementKind::kJump)));
   EXPECT_FALSE(summary.jumps.is_available());
