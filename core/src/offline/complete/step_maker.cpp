@@ -11,6 +11,7 @@
 #include "base/easing.h"
 #include "offline/base/moving_window.h"
 #include "offline/build/bend_toes.h"
+#include "offline/builtin/gait_state.h"
 #include "offline/builtin/leg_ik.h"
 #include "offline/builtin/swing_detour.h"
 #include "offline/extract/extract.h"
@@ -167,8 +168,18 @@ class StepGenerator {
   static double Share(double share) { return std::clamp(share, 0.0, kMaxShare); }
   static double ToFrames(double time_s) { return std::floor(time_s * kFps + 0.5) / kFps; }
 
+  // Returns the factor by which a step takes longer than the captured stride if its length is the
+  // fraction `share` of the length of that stride. People take fewer steps per minute if the steps
+  // are shorter (see builtin::SteadyStepTime).
+  [[nodiscard]] double Slowdown(double share) const {
+    const double full_m = 0.5 * (stride_.start_length_m + stride_.end_length_m);
+    return builtin::SteadyStepTime(std::min(share, 1.0) * full_m) / builtin::SteadyStepTime(full_m);
+  }
+
   void SetTiming() {
-    const auto& keys = stride_.keytimes_s;
+    const double slowdown = 1.0 + in_stride_ * (Slowdown(0.5 * (start_share_ + end_share_)) - 1.0);
+    std::array<double, kIntervals + 1> keys = stride_.keytimes_s;
+    for (double& key : keys) key *= slowdown;
     const auto mix = [](double stand, double stride, double share) {
       return stand + std::min(1.0, 2.0 * share) * (stride - stand);
     };
@@ -271,8 +282,9 @@ class StepGenerator {
     };
     root_.from = state(first, feet_.start_m, start_share_);
     root_.to = RotateYaw(feet_.turn_rad, state(last, feet_.end_m, end_share_));
-    root_.from_velocity = start_share_ * stride_.start_velocity;
-    root_.to_velocity = RotateYaw(feet_.turn_rad, end_share_ * stride_.end_velocity);
+    root_.from_velocity = start_share_ / Slowdown(start_share_) * stride_.start_velocity;
+    root_.to_velocity =
+        RotateYaw(feet_.turn_rad, end_share_ / Slowdown(end_share_) * stride_.end_velocity);
     // A cubic curve would overshoot if it had to cover a short distance from a high speed.
     const auto limit = [&](DVec3& velocity) {
       const DVec3 path = root_.to - root_.from;

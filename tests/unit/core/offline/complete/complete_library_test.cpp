@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "captured_library.h"
 #include "offline/build/grid_cells.h"
@@ -293,6 +294,30 @@ TEST(CompleteLibrary, ShortStepsKeepTheHeightOfTheHips) {
     ++short_steps;
   }
   EXPECT_GT(short_steps, 0);
+}
+
+// People take fewer steps per minute if the steps are shorter.
+TEST(CompleteLibrary, ShortStridesTakeLonger) {
+  const RawLibrary library = Completed(WalkWithoutStop());
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    // Strides as long at the end as at the start, from length to duration.
+    std::map<double, double> duration_s;
+    for (const RawGroup* group : CompletedGroups(library)) {
+      if (group->kind != StepKind(foot) || group->parameters.size() != 2) continue;
+      for (const RawExample& example : group->examples) {
+        const double start_m = -example.parameters[0];
+        const double end_m = example.parameters[1];
+        if (end_m < 0.2 || std::fabs(end_m - start_m) > 0.05) continue;
+        duration_s[end_m] = example.keytimes_s.back();
+      }
+    }
+    ASSERT_EQ(duration_s.size(), 2u);
+    const auto [half_m, half_s] = *duration_s.begin();
+    const auto [full_m, full_s] = *duration_s.rbegin();
+    EXPECT_NEAR(half_m, 0.5 * full_m, 0.05);
+    EXPECT_GT(half_s, 1.05 * full_s);
+    EXPECT_LT(half_s, 1.3 * full_s);
+  }
 }
 
 // The same steps result from captures whose joints have other frames.
