@@ -170,10 +170,15 @@ class StepGenerator {
 
   // Returns the factor by which a step takes longer than the captured stride if its length is the
   // fraction `share` of the length of that stride. People take fewer steps per minute if the steps
-  // are shorter (see builtin::SteadyStepTime).
+  // are shorter (see builtin::SteadyStepTime). Steps of people who walk slowly are not slowed down
+  // further: none takes longer than the slowest step of the generated library, unless the captured
+  // stride does.
   [[nodiscard]] double Slowdown(double share) const {
     const double full_m = 0.5 * (stride_.start_length_m + stride_.end_length_m);
-    return builtin::SteadyStepTime(std::min(share, 1.0) * full_m) / builtin::SteadyStepTime(full_m);
+    const double slowdown =
+        builtin::SteadyStepTime(std::min(share, 1.0) * full_m) / builtin::SteadyStepTime(full_m);
+    const double slowest = builtin::SteadyStepTime(0.0) / stride_.keytimes_s.back();
+    return std::min(slowdown, std::max(slowest, 1.0));
   }
 
   void SetTiming() {
