@@ -31,7 +31,7 @@ class PlayoutClock {
   static constexpr double kQuantile = 0.977;
   /// Maximum difference between the speeds of the display and of the server, as a fraction.
   static constexpr double kMaxRate = 0.05;
-  /// Close to the target, the difference decays with this time constant.
+  /// Time constant with which the delay approaches its target if the difference is small.
   static constexpr double kDecayS = 0.25;
   /// Margin that is added to the delay, as a fraction of the interval between messages.
   static constexpr double kMargin = 0.25;

@@ -28,9 +28,9 @@ class Session : public SessionCommands {
 
   // ---- The application calls these functions.
 
-  /// Starts to connect. `addresses` contains the servers' addresses as texts for messages. The
-  /// caller connects to the address with the index address_index(). An empty list means one address
-  /// without a text.
+  /// Starts connecting. `addresses` contains the address of each server as text, for events and
+  /// error messages only. The caller itself connects to the address with the index address_index().
+  /// An empty list means that there is one address, which no text mentions.
   stridewire_status Open(double now_s, std::vector<std::string> addresses = {});
   void Close(double now_s);
   stridewire_status Ping(double now_s);

@@ -1,6 +1,6 @@
 /**
  * Limits the frame rate. The mean rate is the requested rate, unless the display's refresh rate is
- * lower. The refresh rate need not be a multiple of it.
+ * lower. The refresh rate need not be a multiple of the requested rate.
  */
 export class FrameLimiter {
   /** Mean time between two drawn frames in milliseconds; 0 without a limit. */

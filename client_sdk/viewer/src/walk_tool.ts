@@ -116,7 +116,8 @@ export class WalkTool {
   // ---- goals
 
   /**
-   * Returns the selected avatar, to which walks in this world apply; 0 if there is not exactly one.
+   * Returns the avatar to which walks requested in this pane apply. Returns 0 unless this pane
+   * receives commands and exactly one avatar is their target.
    */
   private target(pane: WorldPane): number {
     const avatars = this.host.targets();

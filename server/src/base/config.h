@@ -101,8 +101,9 @@ struct ConfigKey {
 /// characters. A world name may thus contain slashes, so it must not be used as a file name.
 [[nodiscard]] bool IsWorldName(std::string_view name);
 
-/// Reads TOML text into `config`. `name` is the name of the file. Errors contain it, with the line
-/// and the key or, for a syntax error, its description. On error, `config` is unchanged.
+/// Reads TOML text into `config`. `name` is the file name for errors. Each error contains the file
+/// name, the line, and the key or, if the TOML syntax is invalid, a description of the mistake. On
+/// error, `config` is unchanged.
 [[nodiscard]] Status ReadConfigText(std::string_view text, const std::string& name, Config& config);
 
 /// Checks rules that concern several keys, such as a public address without allow_insecure.

@@ -51,7 +51,8 @@ class RegionMembers {
     std::span<const AvatarId> left;
     std::span<const std::uint32_t> due;  ///< Rows whose poses must be sent.
   };
-  /// `delivery` must contain positions, and its mode must be one of modes().
+  /// Updates the members from poses. `delivery` must contain positions, and its mode must be one of
+  /// modes().
   [[nodiscard]] Change Update(const PoseDelivery& delivery);
   /// Updates the members without poses, for movement mode.
   [[nodiscard]] Change Update(const MovementDelivery& delivery);

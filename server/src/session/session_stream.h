@@ -117,7 +117,8 @@ class SessionStream {
                      double wait_s);
   /// Sends `frames`, which contain poses of `delivery`.
   void SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames);
-  /// Returns how long batches of a tick may wait for those of other shards. 0: they do not wait.
+  /// Returns how long batches of a tick may wait for those of other shards, in seconds. 0: they do
+  /// not wait.
   [[nodiscard]] double GatherTime() const;
   /// Call it after a batch that may wait was passed to the connection. Sends all batches of the
   /// tick once those of all shards have arrived.

@@ -4,8 +4,8 @@ import {h, setText} from '../dom.js';
 const maxValues = 120;
 
 /**
- * A line plot of the last minute, with the newest value as text. The axis ends at the largest
- * value.
+ * A line plot of the last minute, with the newest value as text. The vertical axis starts at 0 and
+ * ends 15 % above the largest value.
  */
 export class Plot {
   readonly element: HTMLElement;

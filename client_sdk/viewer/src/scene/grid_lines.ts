@@ -1,8 +1,8 @@
 /**
  * GLSL for grid lines, shared by the flat grid and the terrain mesh. `grid(p, width)` returns the
- * coverage at p, 0 to 1, of lines at whole numbers that are `width` pixels wide. Lines fade out
- * where they are less than 4 pixels apart, and are invisible where they are less than 1.4 pixels
- * apart.
+ * coverage at p, 0 to 1, of lines that are `width` pixels wide and lie at whole coordinates. Lines
+ * fade out where they are less than 4 pixels apart, and are invisible where they are less than 1.4
+ * pixels apart.
  */
 export const gridLines = /* glsl */ `
 float grid(vec2 p, float width) {

@@ -352,7 +352,7 @@ export class WorldView {
   projectToPage(point: readonly [number, number, number]): {x: number; y: number} | null {
     return this.project(point, 0) ? {x: projected.x, y: projected.y} : null;
   }
-  /** Number of outlines that `showPlannedFootprints` has drawn. */
+  /** Number of planned footprints that are drawn now. */
   get plannedCount(): number {
     return this.planned.count;
   }

@@ -35,9 +35,9 @@ struct MovementRecord {
   std::vector<double> keytimes_s;
   ParameterValues requested;
   ParameterValues applied;  ///< `requested`, clamped to the hull of the examples plus 10 %.
-  /// Sum of the parameters of the blended examples and variants, each multiplied by its weight. The
-  /// weight correction chooses the weights so that `measured` equals `applied`. Equals `applied` if
-  /// the library has no pseudoexamples, and weight correction and stride variation are disabled.
+  /// With weight correction: sum of the parameters of the blended examples and variants, each
+  /// multiplied by its weight. It usually differs from `applied`, because the weights are chosen so
+  /// that `measured` equals `applied`. Without weight correction: same as `applied`.
   ParameterValues corrected;
   ParameterValues measured;  ///< Parameters measured on the movement, a(p) in the paper.
   bool extrapolated = false;

@@ -157,7 +157,7 @@ struct MotionGroup {
   std::span<const double> keytimes_s;
   /// [row]: heading at the end, relative to the start.
   std::span<const double> heading_change_rad;
-  /// [grid point][row][row_floats]: rows of the grid, 64-byte aligned.
+  /// [grid point][row][row_floats]: poses at the grid points (see GridLayout), 64-byte aligned.
   std::span<const float> grid;
   /// [example]: origin, for example "16_21.bvh 0.93-1.47 s".
   std::vector<std::string_view> sources;

@@ -36,8 +36,9 @@ struct Leg {
   int knee = -1;
   int ankle = -1;
   int ball = -1;
-  Vec3 ball_offset_m = Vec3(0.0f);     ///< Ball of the foot, in the frame of joint `ball`.
-  Vec3 toe_tip_offset_m = Vec3(0.0f);  ///< Tip of the toes, in the frame of joint `ball`.
+  /// Position of the ball of the foot in the frame of joint `ball`.
+  Vec3 ball_offset_m = Vec3(0.0f);
+  Vec3 toe_tip_offset_m = Vec3(0.0f);  ///< Position of the tip of the toes in the same frame.
 };
 
 /// A tree of joints. The root is first and parents precede their children. If all rotations are the

@@ -74,7 +74,7 @@ class Terrain {
   /// Validates `data` and builds the spatial index.
   ///
   /// Errors, with the field in Error::where, for example "boxes[3].max_m": kOutOfRange if a number
-  /// is not finite or exceeds its limit, or if max_m does not exceed min_m. kShapeMismatch if the
+  /// is not finite or out of range, or if max_m does not exceed min_m. kShapeMismatch if the
   /// size of heights_m is not columns x rows. kLimitExceeded if there are too many boxes, in total
   /// or in one cell of the index.
   [[nodiscard]] static Expected<std::shared_ptr<const Terrain>> Make(TerrainData data);

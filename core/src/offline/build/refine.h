@@ -14,7 +14,7 @@ namespace stridewire {
 /// Rules by which pseudoexamples are chosen.
 enum class RefineRule : std::uint8_t {
   kAmended,  ///< Tries several passes. Keeps only pseudoexamples that reduce the largest error.
-  kBare,  ///< The rule of the paper: radii follow from all sites, and every pseudoexample is kept.
+  kBare,     ///< The rule of the paper: all sites determine the radii, all pseudoexamples are kept.
 };
 
 /// Defines the radius of a site.

@@ -337,7 +337,8 @@ class FigureBuilder {
               first, first == 1 ? "" : "s", std::max(jumping, FastJoints(0))));
   }
 
-  // The mean of the positions replaces the OFFSET of all joints except the root.
+  // Adds the joints of the figure. If the position of a joint relative to its parent varies, its
+  // mean replaces the OFFSET of the file. This does not apply to the root.
   void BuildJoints() {
     int scaled = 0;
     for (std::size_t k = 0; k < kept_.size(); ++k) {

@@ -18,7 +18,7 @@ constexpr double kSpotTurnRad = 60.0 * kDegree;
 constexpr double kReferenceLegM = 0.86;
 constexpr double kSideStepM = 0.3;        // Additional width of a side step.
 constexpr double kDiagonalLengthM = 0.4;  // Forward distance between the feet in diagonal steps.
-// Sideways distance between the feet after a turn towards the moving foot.
+// Sideways distance between the feet after a turn to the side of the moving foot.
 constexpr double kWidthAfterTurnM = 0.26;
 constexpr std::array kBackwardLengthsM = {0.0, 0.2, 0.4};
 

@@ -29,7 +29,8 @@ using complete::Person;
 using complete::StepSpec;
 using complete::StrideModel;
 
-// Maximum RawLibrary::stand_tilt_m of a stand.
+// If RawLibrary::stand_tilt_m is larger, the figure is on its heels or toes, and the stand pose is
+// composed instead.
 constexpr double kMaxTiltM = 0.02;
 
 // Collects the names of steps that the captures lack, on one side or on both.

@@ -12,7 +12,7 @@ namespace stridewire {
 namespace {
 
 // A leg is bent if the distance of its knee from the line between hip and ankle is more than this
-// fraction of the thigh, which corresponds to about 20 degrees.
+// fraction of the thigh, which corresponds to a bend of the knee by about 20 degrees.
 constexpr float kBent = 0.17f;
 // A foot that points along the line from hip to ankle has no direction. If it points downward, as
 // in a swing, its direction is uncertain, because a small tilt changes it by a large angle.

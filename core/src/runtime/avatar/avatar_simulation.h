@@ -167,7 +167,7 @@ class AvatarSimulation {
   [[nodiscard]] double time_s() const { return time_s_; }
   /// A number that changes whenever a movement or idle motion starts or ends, and on Teleport.
   /// While it stays the same, displayed_movement() and movement_time_s() determine the displayed
-  /// pose without layers.
+  /// pose before layers are applied.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// True if the avatar moves or idles without layers, the last Advance produced neither events nor
   /// a change(), and no call since then has scheduled an event.

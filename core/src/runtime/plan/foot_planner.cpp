@@ -391,9 +391,10 @@ class Planner {
     return std::min(push_m, kMaxPushM);
   }
 
-  // Returns the shift that keeps the root between both feet at the end of a step. The root follows
-  // the supporting foot, so it would be too close to that foot if the moving foot lands at another
-  // place than in the blend. The shift is half of the distance between these places.
+  // Returns the horizontal shift that keeps the root midway between the feet at the end of a step.
+  // The root follows the supporting foot, so it does not adapt to where the moving foot lands. The
+  // shift is half of the vector from the landing place of the blend to the planned one, limited to
+  // kMaxCentreShiftM. Both places are relative to the supporting foot.
   DVec3 ShiftToCentre(Foot moving) const {
     const FootPlan& plan = movement_.feet;
     const Foot fixed = OtherFoot(moving);

@@ -36,9 +36,10 @@ inline constexpr double kHurriedRate = 1.6;
 
 /// Determines how fast a movement is played if it would take long.
 struct PlaybackPace {
-  double max_rate = 1.0;             ///< Maximum playback speed; 1 is that of the examples.
-  double long_s = kQuickStepS;       ///< Movements up to this duration are not played faster.
-  double shortened_s = kQuickStepS;  ///< Duration of longer movements, if `max_rate` allows it.
+  double max_rate = 1.0;        ///< Maximum playback speed; 1 is that of the examples.
+  double long_s = kQuickStepS;  ///< Movements up to this duration are not played faster.
+  /// Duration to which longer movements are shortened, if `max_rate` allows it.
+  double shortened_s = kQuickStepS;
 
   /// Returns the playback speed of a movement whose examples take `duration_s`.
   [[nodiscard]] double RateOf(double duration_s) const {

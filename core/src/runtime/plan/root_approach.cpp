@@ -20,7 +20,8 @@ constexpr double kLeastMaxMPerS2 = 1.0;
 constexpr double kMaxApproachS = 0.8;
 // Vertical accelerations have a smaller weight, because climbing legs push the body up.
 constexpr double kVerticalWeight = 0.4;
-// On level ground, the approach includes the height only if the root rises by more than this.
+// On level ground, the longer blend of the root includes its height only if the root has to rise by
+// more than this. Otherwise, only its horizontal position is blended for longer.
 constexpr double kMaxLevelRiseM = 0.05;
 // On terrain the blend is shorter, because a climbing or descending leg has less reach to spare.
 constexpr double kMaxTerrainApproachS = 0.35;

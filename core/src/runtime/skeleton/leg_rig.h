@@ -24,7 +24,7 @@ struct LegRig {
     /// Hinge axis of the knee in the frame of the hip joint, of unit length. A positive rotation
     /// about it moves the shank backward.
     Vec3 hinge = Vec3(0.0f);
-    /// Height of the ball's centre above the ground in the stand pose.
+    /// Height of the ball (Leg::ball_offset_m) above the ground in the stand pose.
     double ball_height_m = 0.0;
     double ankle_height_m = 0.0;  ///< Height of the ankle above the ground in the stand pose.
     /// Heading of the foot (from ankle to ball) in the stand pose, in which the avatar has heading

@@ -33,8 +33,9 @@ constexpr int kMaxHalvings = 3;
 // Size of a variation in radians, as measured by PoseChange. Larger variations push toes into the
 // ground in steps of the generated library.
 constexpr double kVariedRad = 0.04;
-// Maximum size of the difference between a variant and a blend, as measured by PoseChange. With
-// larger differences, knees that bend quickly when a foot lands would bend even more quickly.
+// Maximum change of a pose by a variant, as measured by PoseChange. If it would be larger, the
+// weight of the variant is reduced. Otherwise, knees that bend quickly when a foot lands would bend
+// even more quickly.
 constexpr double kVariantRad = 0.5;
 constexpr double kTiny = 1e-9;
 // Fractions of a step at which PoseChange measures the pose.

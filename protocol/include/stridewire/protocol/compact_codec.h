@@ -141,8 +141,8 @@ class CompactCodec {
   void Encode(const SoaPoses& poses, Block& block) const;
 
   /// Decodes a pose. `in` needs no alignment. Rotations are unit to float32 precision. Fails with
-  /// kShapeMismatch if a size is wrong, kOutOfRange for the root, and kMalformed for bits that no
-  /// encoder writes.
+  /// kShapeMismatch if a size is wrong, kOutOfRange if the root is out of range, and kMalformed
+  /// for bits that no encoder writes.
   [[nodiscard]] Status Decode(std::span<const std::byte> in, Vec3& root_position_m,
                               std::span<Quat> rotations) const;
 
