@@ -134,7 +134,7 @@ class Summarizer {
     const Vec3 way = pose_.root_position_m - from;
     measured.travelled_m = std::hypot(way.x, way.z);
     measured.turn_deg = kDegreesPerRadian * turn_rad;
-    const auto keys = static_cast<std::size_t>(group.interval_count() + 1);
+    const auto keys = static_cast<std::size_t>(group.interval_count()) + 1;
     measured.duration_s = group.keytimes_s[static_cast<std::size_t>(example) * keys + keys - 1];
     return measured;
   }
