@@ -17,7 +17,7 @@ std::vector<std::size_t> ChooseVariants(const std::vector<GridExample>& found,
                                         std::span<const SelectedExample> used,
                                         std::span<const double> units, bool is_smooth) {
   STRIDEWIRE_CHECK(used.size() == found.size());
-  if (units.size() > kMaxVariedParameters) return {};
+  if (units.size() > kMaxVariantParameters) return {};
   std::vector<double> medians;
   for (std::size_t l = 0; l < units.size(); ++l) {
     std::vector<double> values;

@@ -41,7 +41,12 @@ constexpr double kTiny = 1e-9;
 // Fractions of a step at which PoseChange measures the pose.
 constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
 // Maximum change of a weight relative to its value, before the effect on the parameters is removed.
-constexpr double kMaxRelativeChange = 3.0;
+// In groups of generated steps, what then remains of the change is small. Starts and stops of a
+// walk vary less: they are rarely repeated, and toes of generated ones would sink into the ground.
+constexpr double kMaxRelativeChange = 12.0;
+constexpr double kMaxRelativeChangeAtStand = 3.0;
+// Steps that turn by at most this may vary in pose.
+constexpr double kMaxVariedTurnRad = 0.1;
 // A group of climbing steps has smaller limits on weights if it has fewer captured examples than
 // this per coefficient of the linear part.
 constexpr int kExamplesPerCoefficient = 4;
@@ -207,10 +212,11 @@ double PoseChange(const MotionGroup& group, const GridLayout& layout,
 }
 
 // Adds a change to the weights [n]. `size_rad` is the size of the change as measured by PoseChange.
-// The change is scaled to kVariedRad, or less if the limits on weights require it.
-void AddVariation(std::span<const double> change, double size_rad, double max_sum,
+// The change is scaled to kVariedRad, or less if the limits on weights require it: at most by
+// `max_scale`, and the sum of |w| stays below `max_sum`.
+void AddVariation(std::span<const double> change, double size_rad, double max_scale, double max_sum,
                   std::span<double> weights) {
-  const double scale = std::min(kMaxRelativeChange, kVariedRad / std::max(size_rad, kTiny));
+  const double scale = std::min(max_scale, kVariedRad / std::max(size_rad, kTiny));
   double sum = 0.0;
   for (std::size_t e = 0; e < weights.size(); ++e) {
     sum += std::fabs(weights[e] + scale * change[e]);
@@ -220,6 +226,19 @@ void AddVariation(std::span<const double> change, double size_rad, double max_su
   const double room = std::max(0.0, max_sum - kMargin - before);
   const double part = scale * std::min(1.0, room / std::max(sum - before, kTiny));
   for (std::size_t e = 0; e < weights.size(); ++e) weights[e] += part * change[e];
+}
+
+// Returns true if a step may vary in pose. Steps that turn are rarely repeated, and their examples
+// differ so much that soles would enter the ground. If a group with more than two parameters has
+// none for the sideways position of the foot that lands, a variation would move that foot sideways,
+// and steps on the spot would leave their place.
+bool MayVary(const MotionGroup& group, const ParameterValues& wanted) {
+  if (wanted.count <= static_cast<int>(kMaxVariantParameters)) return true;
+  const int turn = group.FindParameter(ParameterName::kTurn);
+  return group.FindParameter(ParameterName::kEndX) >= 0 &&
+         group.FindParameter(ParameterName::kEndY) < 0 &&
+         (turn < 0 ||
+          std::fabs(wanted.values[static_cast<std::size_t>(turn)]) <= kMaxVariedTurnRad);
 }
 
 // Returns true if a step starts or stops a walk, that is, if the feet are beside each other at its
@@ -328,7 +347,7 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
   SetWeights(group, -1, std::span(wanted.values).first(d), weights, movement);
   LimitNegativeWeights(limits.start_weight_sum, weights);
   double max_sum = std::max(limits.weight_sum, SumOfMagnitudes(weights));
-  const bool is_varied = variation.has_value() && d <= kMaxVariedParameters;
+  const bool is_varied = variation.has_value() && MayVary(group, wanted);
   if (is_varied && group.variant_count == 0) {
     const std::size_t kept_count = KeepInVariation(group, wanted, unit, scratch.slopes_);
     const std::span<const double> kept = std::span(scratch.slopes_).first(kept_count * n);
@@ -336,7 +355,9 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
     if (step.is_solvable()) {
       step.Vary(*variation, next);
       ApplyWeights(group, next, movement);
-      AddVariation(next, PoseChange(group, ends.layout(), movement.weights), max_sum, weights);
+      AddVariation(next, PoseChange(group, ends.layout(), movement.weights),
+                   StartsOrStops(group, wanted) ? kMaxRelativeChangeAtStand : kMaxRelativeChange,
+                   max_sum, weights);
     }
   }
   if (is_varied) share = ChooseVariant(group, wanted, *variation);

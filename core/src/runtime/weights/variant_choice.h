@@ -8,10 +8,9 @@
 
 namespace stridewire {
 
-/// Steps vary in pose only in groups with at most this many parameters, that is, if they are
-/// straight. Other steps are rarely repeated. Their examples differ so much that soles would enter
-/// the ground.
-inline constexpr std::size_t kMaxVariedParameters = 2;
+/// Groups with more parameters than this have no variants. Groups of steps with at most two
+/// parameters contain only straight steps; steps of other groups rarely have similar parameters.
+inline constexpr std::size_t kMaxVariantParameters = 2;
 
 /// A variant that a step blends (see MotionGroup).
 struct VariantShare {
