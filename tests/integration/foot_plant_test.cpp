@@ -13,6 +13,8 @@
 #include "runtime/skeleton/leg_rig.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/bvh_writer.h"
+#include "stridewire/offline/library_builder.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {
@@ -244,6 +246,23 @@ TEST(FootprintError, ReportsHowFarAStepMissesItsFootprint) {
   const DVec3 landed = missed.plants.back().anchor_m;
   EXPECT_NEAR(missed.landing_error_m, std::hypot(0.1 - landed.x, 2.5 - landed.z), 1e-4);
   EXPECT_GT(missed.landing_error_m, 1.0);
+}
+
+// The ball of this foot is so near its ankle that squares of the distance are 0 in float.
+TEST(ShortFoot, IsPlantedWithoutADirection) {
+  RawLibrary raw = MakeTestRawLibrary();
+  raw.skeleton.legs[1].ball_offset_m.z = 3.1e-43f;
+  LibraryBuilder builder;
+  const Library library = builder.Build(raw).value();
+  std::vector<MovementRequest> requests;
+  for (int i = 0; i < 4; ++i) requests.push_back({1, StepRequest{.length_m = 0.5}});
+  requests.push_back({2, JumpRequest{.length_m = 0.6}});
+  const auto synthesis = Synthesize({.library = library, .requests = requests, .fps = kFps});
+  ASSERT_TRUE(synthesis.has_value());
+  EXPECT_EQ(synthesis->movements.back().kind, MovementKind::kJump);
+  for (const Quat& rotation : synthesis->clip.rotations) {
+    ASSERT_NEAR(glm::length(rotation), 1.0f, 1e-4f);
+  }
 }
 
 }  // namespace

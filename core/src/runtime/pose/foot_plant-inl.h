@@ -301,6 +301,8 @@ HWY_INLINE bool RaiseHeels(const LegRig& rig, const SoaBones* work, Float share,
   SoaVec3 soles[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     soles[f] = targets[f].ball_m - targets[f].ankle_m;
+    excess[f] = Float(0.0f);
+    if (bones.foot_m < kSmallestBoneM) return;  // The foot has no direction.
     const SoaVec3& shank = work[f].new_shank;
     const Float cosine = -Dot(soles[f], shank) / Sqrt(Dot(soles[f], soles[f]) * Dot(shank, shank));
     excess[f] = DivideBy(cosine - Float(bones.ankle_limit_cosine), bones.ankle_limit_sine);
