@@ -5,6 +5,7 @@
 
 #include "base/check.h"
 #include "runtime/plan/root_approach.h"
+#include "runtime/plan/root_dip.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 
@@ -107,6 +108,7 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScr
     ContinueFeet(keeps_speed, PlanFeet(job, landing));
     PlanRootApproach(job);
     LiftWhileSettling(job);
+    PlanRootDip(job);
     if (begins_planting) BeginPlantFade(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
     return;

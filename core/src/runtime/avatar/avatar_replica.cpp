@@ -315,6 +315,8 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
         if (!(residual.over_s > 0.0))
           reader.Reject("a foot residual in a movement record has no duration");
       }
+      if (movement.feet.root_dip.depth_m != 0.0 && !IsStep(body_.group().kind))
+        reader.Reject("a movement record contains a root dip, but its movement is not a step");
       movement.feet.packed = PackFootPlan(movement);
     }
   } else {

@@ -151,6 +151,10 @@ void PlanFields(Stream& stream, P& plan) {
   Vector(stream, plan.root_approach.offset_m);
   Vector(stream, plan.root_approach.offset_m_s);
   stream.F64(plan.root_approach.over_s);
+  if (plan.keeps_above_ground) {
+    auto& dip = plan.root_dip;
+    for (auto* value : {&dip.depth_m, &dip.speed_m_s, &dip.over_s}) stream.F64(*value);
+  }
   bool settles = plan.plant_fade_s > 0.0;
   stream.Bool(settles);
   if (!settles) return;

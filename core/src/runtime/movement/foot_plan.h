@@ -89,11 +89,21 @@ struct RootApproach {
   double over_s = 0.0;
 };
 
+/// A temporary descent of the root in a step on terrain. It begins at Movement::start_offset_s,
+/// reaches `depth_m` when the moving foot is released, and ends `over_s` later. Without it, a leg
+/// that is fully extended before its foot is released would pull the root down, and the root would
+/// spring up after the release.
+struct RootDip {
+  double depth_m = 0.0;    ///< Depth at the release; >= 0. 0: no descent.
+  double speed_m_s = 0.0;  ///< Speed of the descent at the release.
+  double over_s = 0.0;     ///< Time from the release until the root has risen again.
+};
+
 /// A foot plan in the layout that the planting kernels read: groups of four floats, with positions
 /// relative to the base of the movement. PackFootPlan writes the trajectories of both feet and then
 /// the data that both have in common.
 inline constexpr std::size_t kPackedTrajectoryFloats = 60;
-inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 20;
+inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 24;
 using PackedFootPlan = std::array<float, kPackedPlanFloats>;
 
 /// The plan for both feet of a movement. Together with the blended pose and the time, it determines
@@ -114,6 +124,7 @@ struct FootPlan {
   DVec3 root_residual_m = DVec3(0.0);
   DVec3 root_residual_m_s = DVec3(0.0);
   RootApproach root_approach;
+  RootDip root_dip;
   /// True on terrain: planting lifts soles out of the ground that they leave and land on. False on
   /// level ground: the blend already keeps soles close to the ground, and a lift would only move
   /// the knees.

@@ -205,3 +205,24 @@ STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timi
   return AddBoth(shift + approached, Vector{flat * offset.x, rise * offset.y, flat * offset.z},
                  Vector{part_s * velocity.x, blended_s * velocity.y, part_s * velocity.z});
 }
+
+// Data of FootPlan::root_dip.
+template <typename Number>
+struct RootDipOf {
+  Number depth, speed, release_s, over_s;
+};
+
+// Returns by how much a dip lowers the root: a cubic Hermite curve from 0 to the depth and speed at
+// the release, and another one back to 0.
+template <typename Number, typename Timing>
+STRIDEWIRE_INLINE Number DipAt(const Timing& timing, const RootDipOf<Number>& dip) {
+  const Number one = Constant<Number>(1.0);
+  const auto is_rising = timing.time_s > dip.release_s;
+  const Number length_s = Max(Select(is_rising, dip.over_s, dip.release_s - timing.start_offset_s),
+                              Constant<Number>(kLeastDipS));
+  const Number from_release_s = timing.time_s - dip.release_s;
+  const Number away = Min(one, Max(from_release_s, -from_release_s) / length_s);
+  const Number left = one - away;
+  const Number speed = Select(is_rising, dip.speed, -dip.speed);
+  return left * left * (dip.depth * OnePlusTwice(away) + speed * (length_s * away));
+}

@@ -483,6 +483,11 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
     shift = shift + c.root;
   });
   shift = AddRootResidual<Float>(shift, common, common.root_residual);
+  const SoaQuat dip = LoadQuat(plan + (2 * kPackedTrajectoryFloats + 20) * kBlock);
+  if (Any(dip.x > Float(0.0f))) {
+    const Float depth = DipAt<Float>(common, {dip.x, dip.y, dip.z, dip.w});
+    shift.y = shift.y - Select(dip.x > Float(0.0f), depth, Float(0.0f));
+  }
 
   Float lowers[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {

@@ -92,6 +92,11 @@ Quat RotationFromUp(const Vec3& normal) {
   return Normalise(Quat(1.0f + normal.y, normal.z, 0.0f, -normal.x));
 }
 
+// Returns the time at which the moving foot of a step is released.
+double ReleaseTime(const FootPlan& plan) {
+  return std::min(plan.feet[0].release_s, plan.feet[1].release_s);
+}
+
 // Returns the part of a foot's correction that also moves the root.
 DVec3 RootShare(const FootCorrection& correction) {
   return correction.root_weight * correction.offset_m + correction.root_shift_m;
@@ -155,6 +160,11 @@ FeetCorrection CorrectFeet(const Movement& movement, double time_s, const FeetAt
                                                   .approach_over_s = approach.over_s};
   corrections.root_m =
       AddRootResidual<double>(corrections.root_m, Timing(movement, time_s), residual);
+  const RootDip& dip = plan.root_dip;
+  if (dip.depth_m > 0.0) {
+    corrections.root_m.y -= DipAt<double>(
+        Timing(movement, time_s), {dip.depth_m, dip.speed_m_s, ReleaseTime(plan), dip.over_s});
+  }
   return corrections;
 }
 
@@ -296,6 +306,8 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
       plan.plant_fade_s);
   add(plan.root_approach.offset_m, plan.root_approach.over_s);
   add(plan.root_approach.offset_m_s, 0.0);
+  const RootDip& dip = plan.root_dip;
+  add({dip.depth_m, dip.speed_m_s, ReleaseTime(plan)}, dip.over_s);
   return packed;
 }
 

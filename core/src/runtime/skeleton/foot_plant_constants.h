@@ -63,6 +63,9 @@ inline constexpr LiftCurve kLiftCurves[3] = {
 // kHeelUp (LegPose::Flatness) it has no effect, and from kSoleDown on it has its full effect.
 inline constexpr double kHeelUp = 0.5;
 inline constexpr double kSoleDown = 0.8;
+// Minimum duration of each half of a dip of the root (RootDip). Movement records may contain
+// shorter ones.
+inline constexpr double kLeastDipS = 1e-3;
 // Angle between the heading of a standing foot and that of its footprint. Up to kAheadRad, the
 // heading lock has its full effect, and from kReversedRad on it has none.
 inline constexpr double kAheadRad = 1.0;
