@@ -224,9 +224,10 @@ class SessionState {
   std::uint64_t resumes_ = 0;
   std::uint64_t connect_failures_ = 0;
   std::uint64_t playout_jumps_ = 0;
-  /// Mean lateness of messages with poses, relative to the fastest message of the last seconds.
+  /// Running mean of the lateness of messages with poses or movements. The lateness is relative to
+  /// the fastest message in the last ClockMap::kWindowS.
   double jitter_s_ = 0.0;
-  double worst_jitter_s_ = 0.0;  ///< Largest lateness of the last seconds.
+  double worst_jitter_s_ = 0.0;  ///< Largest recent lateness. Expires after ClockMap::kWindowS.
   double worst_jitter_at_s_ = 0.0;
 };
 

@@ -277,7 +277,8 @@ class WorldView : public PoseSink {
   /// Copies the movement of an avatar unless the track has it already.
   static void KeepMovement(Track& track, const AvatarReplica& replica);
 
-  /// Records the poses of the avatars in `evaluated_`, which a message with movements has produced.
+  /// Adds a batch to the recording after a Movements message: the poses of the avatars in
+  /// `evaluated_`, and the avatars in `moving_`, whose movements are recorded instead of poses.
   void RecordEvaluated(const protocol::Movements& movements);
   void EncodeBlock(const protocol::CompactCodec& codec);
 

@@ -30,8 +30,9 @@ struct LoadReport {
   std::uint64_t poses_received = 0;  ///< Poses received at measured ticks, summed over observers.
   /// Expected poses: observed avatars times measured ticks, summed over all observers.
   std::uint64_t poses_expected = 0;
-  std::uint64_t poses_invalid = 0;    ///< Received poses that failed a check.
-  std::uint64_t bytes_received = 0;   ///< Bytes of the frames of measured batches, with headers.
+  std::uint64_t poses_invalid = 0;  ///< Received poses that failed a check.
+  /// Total size of the frames of all measured batches, including headers.
+  std::uint64_t bytes_received = 0;
   std::uint64_t batches_dropped = 0;  ///< Batches that the server dropped for slow observers.
   /// Fraction of the received poses in which the avatar did not stand.
   std::optional<double> moving_share;

@@ -25,7 +25,7 @@ export class RandomWalkers {
   }
 
   /**
-   * Starts to request movements for an avatar that stands at `x`, `z` (metres) and faces
+   * Starts requesting movements for an avatar that stands at `x`, `z` (metres) and faces
    * `headingRad`.
    */
   add(avatar: number, x = 0, z = 0, headingRad = 0): void {

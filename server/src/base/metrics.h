@@ -48,8 +48,9 @@ class TimeHistogram {
 };
 
 /// Counters of one thread: a shard, or the main thread that accepts connections. Only this thread
-/// writes them. They are aligned to two cache lines, because processors prefetch lines in pairs.
-/// Data of other threads is thus never in these lines.
+/// writes them, except that Metrics::Text resets the recent maxima of histograms. They are aligned
+/// to two cache lines, because processors prefetch lines in pairs. Data of other threads is thus
+/// never in these lines.
 struct alignas(128) ThreadMetrics {
   Count avatars;
   Count regions;  ///< Regions that sessions of this shard observe.

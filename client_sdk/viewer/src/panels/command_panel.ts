@@ -18,7 +18,7 @@ export interface CommandActions {
   /** Sets the tool for clicks on the ground. Null: clicks select avatars. */
   setTool(tool: ClickTool | null): void;
   addWaypoint(x: number, z: number): void;
-  /** Requests a walk. With heading null, the avatar keeps its direction of arrival. */
+  /** Requests a walk. If `headingRad` is null, the avatar keeps the heading it arrives with. */
   walkTo(x: number, z: number, headingRad: number | null): void;
   setTerrain(name: SampleTerrainName): void;
   toggleLayer(name: string): void;

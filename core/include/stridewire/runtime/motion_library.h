@@ -205,9 +205,9 @@ class MotionLibrary {
 
   /// Opens a library file. Verifies its header, hash and FlatBuffers structure and validates all
   /// values before it uses any. Errors, with the file in Error::where: kNotFound or kIo if the file
-  /// cannot be read. kMalformed, kVersionMismatch or kLimitExceeded for its contents. kOutOfRange
-  /// or kInvalidArgument for its skeleton (Skeleton::Validate). kUnsupported in WebAssembly, which
-  /// cannot open files.
+  /// cannot be read; kMalformed, kVersionMismatch or kLimitExceeded if its contents are invalid;
+  /// kOutOfRange or kInvalidArgument if its skeleton is invalid (Skeleton::Validate); kUnsupported
+  /// in WebAssembly, which cannot open files.
   [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> Open(
       const std::filesystem::path& path);
 

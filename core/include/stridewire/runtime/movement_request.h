@@ -66,7 +66,8 @@ struct JumpRequest {
   bool allow_nearest = false;
 };
 
-/// Requests standing still for `seconds`. A walking avatar first brings its feet together.
+/// Requests that the avatar stand still for `seconds`. If the avatar walks, it first brings its
+/// feet together.
 struct StandRequest {
   double seconds = 0.0;
 };

@@ -218,8 +218,8 @@ class Comparer {
                                  std::span<const Pose> truth) {
     const Foot moving = MovingFoot(group_.kind);
     const auto m = static_cast<std::size_t>(moving);
-    // Returns the feet of a pose. The moving foot stands at the height that is the parameter
-    // `height`, or at 0 if the group does not have it. The other foot stands at 0.
+    // Returns the feet of a pose. The ground under the moving foot is at GroundRise of the
+    // parameter `height`, or at 0 if the group lacks this parameter. The other foot stands at 0.
     const auto feet_of = [&](const Pose& pose, ParameterName height) {
       FootLocks feet = FootLocksOf(library_.skeleton(), library_.leg_rig(), pose, 0.0, nullptr);
       if (const int l = group_.FindParameter(height); l >= 0) {

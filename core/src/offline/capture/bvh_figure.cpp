@@ -291,8 +291,8 @@ class FigureBuilder {
     });
   }
 
-  // Composes the constant rotations above the root: those of the top joint and of the joints below
-  // it, up to the first joint whose rotation changes.
+  // Composes the constant rotations above the root, from the top joint down. Stops before the first
+  // joint whose rotation changes.
   void FindFixedTurn() {
     for (std::size_t i = 0; i < root_; ++i) {
       const DQuat first = motion_.LocalRotation(figure_.first_frame, chain_[i]);

@@ -32,9 +32,9 @@ struct BvhFigure {
   Clip clip;                        ///< Local rotations; its root positions are not set.
   std::vector<DVec3> roots;         ///< Root position in each frame.
   FoundLegs legs;
-  /// Product of the rotations of the topmost joints above the root, up to the first one whose
-  /// rotation changes. FindFigureAxes determines whether the rest pose stands upright with or
-  /// without it.
+  /// Product of the constant rotations above the root, from the top joint down. It ends before the
+  /// first joint whose rotation changes. FindFigureAxes determines whether the rest pose stands
+  /// upright with or without it.
   DQuat fixed_turn = DQuat(1.0, 0.0, 0.0, 0.0);
   int first_frame = 0;  ///< Number of frames at the start that contain an artificial rest pose.
   std::vector<AveragedJoint> averaged;

@@ -12,12 +12,12 @@
 namespace stridewire::complete {
 
 /// A pose in double precision, with the positions of its feet for inverse kinematics. Positions and
-/// world rotations are relative to the heading.
+/// ankle rotations are in the heading frame.
 struct PostureSample {
   DVec3 root_m = DVec3(0.0);
   /// [joint]: rotation relative to the parent or, for the root, to the heading.
   std::vector<DQuat> rotations;
-  std::array<DQuat, 2> ankles;                           ///< [Foot]: world rotation of the ankle.
+  std::array<DQuat, 2> ankles;                           ///< [Foot]: rotation of the ankle.
   std::array<DVec3, 2> balls_m{DVec3(0.0), DVec3(0.0)};  ///< [Foot]: position of the ball.
 };
 

@@ -309,7 +309,9 @@ class StepGenerator {
     const double captured_s = CapturedTimeAt(generic);
     DVec3 deviation = share * (sample_.root_m - captured_.At(captured_s));
     const double heading = HeadingAt(time_s);
-    // The speed of the pelvis oscillates in proportion to the walking speed.
+    // The amplitude of the pelvis's forward oscillation is proportional to the walking speed. If
+    // the root is slower than in a blend of the stand and the captured stride, the deviation is
+    // reduced accordingly. It is never increased.
     const double usual_m_s = share * captured_.VelocityAt(captured_s).z;
     const double speed_m_s = Turned(-heading, root_.VelocityAt(time_s)).z;
     if (usual_m_s > 0.0) deviation.z *= std::clamp(speed_m_s / usual_m_s, 0.0, 1.0);

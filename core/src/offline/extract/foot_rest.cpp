@@ -83,8 +83,9 @@ class RestFinder {
   // Resting heights of the points of the foot.
   using RestHeights = std::array<double, FootPaths::kPoints>;
 
-  // Measures the lowest height at which the foot rests within a range. For a point that never rests
-  // in the range, uses its height on the usual flat foot.
+  // Returns the resting height of each point of the foot within a range of frames. A point that
+  // never rests while the steadiest point is at its resting height gets its usual height relative
+  // to the steadiest point (flat_height_m).
   [[nodiscard]] RestHeights MeasureRest(const FrameRange& range, double rest_speed) const {
     const std::size_t steadiest = SteadiestPoint(range, rest_speed);
     std::vector<double> heights;

@@ -86,8 +86,8 @@ Json RefusalsToJson(const std::vector<Refusal>& refusals) {
   for (const Refusal& refusal : refusals) {
     list.push_back({{"request", refusal.request_id - 1},
                     {"kind", refusal.kind},
-                    {"asked", ValuesToJson(refusal.asked)},
-                    {"got", ValuesToJson(refusal.got)},
+                    {"asked", ValuesToJson(refusal.requested)},
+                    {"got", ValuesToJson(refusal.actual)},
                     {"missed_m", refusal.missed_m},
                     {"missed_rad", refusal.missed_rad},
                     {"reason", refusal.reason}});

@@ -77,25 +77,25 @@ class RefusalFinder {
     const DVec3 landed = BallAt(record.end_s, moving);
     const DVec3 fixed = BallAt(record.end_s, OtherFoot(moving));
     const double heading = before.heading_rad + step.turn_rad;
-    const DVec3 got = RotateYaw(-record.base.heading_rad, landed - fixed);
-    const double side_m = step.side_m.value_or(outward * got.x);
-    const double rise_m = input_.options.terrain != nullptr ? got.y : step.height_m;
-    const DVec3 asked(outward * side_m, rise_m, step.length_m);
-    const DVec3 missed = got - asked;
+    const DVec3 actual = RotateYaw(-record.base.heading_rad, landed - fixed);
+    const double side_m = step.side_m.value_or(outward * actual.x);
+    const double rise_m = input_.options.terrain != nullptr ? actual.y : step.height_m;
+    const DVec3 requested(outward * side_m, rise_m, step.length_m);
+    const DVec3 missed = actual - requested;
     const double turned = record.base.heading_rad - before.heading_rad;
     Refusal refusal{.request_id = id, .kind = "step"};
-    refusal.asked = {{"length_m", step.length_m}, {"turn_rad", step.turn_rad}};
-    refusal.got = {{"length_m", got.z}, {"turn_rad", turned}};
+    refusal.requested = {{"length_m", step.length_m}, {"turn_rad", step.turn_rad}};
+    refusal.actual = {{"length_m", actual.z}, {"turn_rad", turned}};
     if (step.side_m) {
-      refusal.asked.emplace_back("side_m", *step.side_m);
-      refusal.got.emplace_back("side_m", outward * got.x);
+      refusal.requested.emplace_back("side_m", *step.side_m);
+      refusal.actual.emplace_back("side_m", outward * actual.x);
     }
     if (input_.options.terrain == nullptr) {
-      refusal.asked.emplace_back("height_m", step.height_m);
-      refusal.got.emplace_back("height_m", got.y);
+      refusal.requested.emplace_back("height_m", step.height_m);
+      refusal.actual.emplace_back("height_m", actual.y);
     }
     refusal.missed_m = std::sqrt(missed.x * missed.x + missed.y * missed.y + missed.z * missed.z);
-    const DVec3 path = fixed + RotateYaw(heading, asked) - start;
+    const DVec3 path = fixed + RotateYaw(heading, requested) - start;
     refusal.missed_rad =
         std::max(std::fabs(turned - step.turn_rad),
                  refusal.missed_m > kMetM ? DirectionError(path, landed - start) : 0.0);
@@ -103,7 +103,7 @@ class RefusalFinder {
     refusal.reason = Text("missed its request: the %s foot should land ", foot) +
                      AheadText(step.length_m) +
                      " the other foot, but the nearest step of the library lands " +
-                     AheadText(got.z) + " it, " + MissText(refusal);
+                     AheadText(actual.z) + " it, " + MissText(refusal);
     AddIfMissed(std::move(refusal));
   }
 
@@ -112,17 +112,18 @@ class RefusalFinder {
     const Foot moving = MovingFoot(record.kind);
     const DVec3 landed = BallAt(record.end_s, moving);
     const DVec3 start = BallAt(record.start_s, moving);
-    const DVec3 asked = step.at->position_m;
+    const DVec3 requested = step.at->position_m;
     const double heading = step.at->heading_rad.value_or(before.heading_rad);
     Refusal refusal{.request_id = id, .kind = "step"};
-    refusal.asked = {{"at_x_m", asked.x}, {"at_z_m", asked.z}, {"heading_rad", heading}};
-    refusal.got = {
+    refusal.requested = {
+        {"at_x_m", requested.x}, {"at_z_m", requested.z}, {"heading_rad", heading}};
+    refusal.actual = {
         {"at_x_m", landed.x}, {"at_z_m", landed.z}, {"heading_rad", record.base.heading_rad}};
-    refusal.missed_m = Horizontal(landed - asked);
-    refusal.missed_rad =
-        std::max(std::fabs(WrapAngle(record.base.heading_rad - heading)),
-                 refusal.missed_m > kMetM ? DirectionError(asked - start, landed - start) : 0.0);
-    refusal.reason = "missed its request: the foot should land at " + Place(asked) +
+    refusal.missed_m = Horizontal(landed - requested);
+    refusal.missed_rad = std::max(
+        std::fabs(WrapAngle(record.base.heading_rad - heading)),
+        refusal.missed_m > kMetM ? DirectionError(requested - start, landed - start) : 0.0);
+    refusal.reason = "missed its request: the foot should land at " + Place(requested) +
                      ", but the nearest step of the library lands at " + Place(landed) + ", " +
                      MissText(refusal);
     AddIfMissed(std::move(refusal));
@@ -130,25 +131,26 @@ class RefusalFinder {
 
   void CheckJump(std::uint64_t id, const JumpRequest& jump, const MovementRecord& record,
                  const BaseFrame& before) {
-    const DVec3 got = RotateYaw(-before.heading_rad, record.base.position_m - before.position_m);
+    const DVec3 actual = RotateYaw(-before.heading_rad, record.base.position_m - before.position_m);
     const double turned = record.base.heading_rad - before.heading_rad;
-    const DVec3 asked(0.0, input_.options.terrain != nullptr ? got.y : jump.height_m,
-                      jump.length_m);
+    const DVec3 requested(0.0, input_.options.terrain != nullptr ? actual.y : jump.height_m,
+                          jump.length_m);
     Refusal refusal{.request_id = id, .kind = "jump"};
-    refusal.asked = {{"length_m", jump.length_m}, {"turn_rad", jump.turn_rad}};
-    refusal.got = {{"length_m", got.z}, {"turn_rad", turned}};
+    refusal.requested = {{"length_m", jump.length_m}, {"turn_rad", jump.turn_rad}};
+    refusal.actual = {{"length_m", actual.z}, {"turn_rad", turned}};
     if (input_.options.terrain == nullptr) {
-      refusal.asked.emplace_back("height_m", jump.height_m);
-      refusal.got.emplace_back("height_m", got.y);
+      refusal.requested.emplace_back("height_m", jump.height_m);
+      refusal.actual.emplace_back("height_m", actual.y);
     }
-    refusal.missed_m = std::hypot(Horizontal(got - asked), got.y - asked.y);
-    refusal.missed_rad = std::max(std::fabs(turned - jump.turn_rad),
-                                  refusal.missed_m > kMetM ? DirectionError(asked, got) : 0.0);
+    refusal.missed_m = std::hypot(Horizontal(actual - requested), actual.y - requested.y);
+    refusal.missed_rad =
+        std::max(std::fabs(turned - jump.turn_rad),
+                 refusal.missed_m > kMetM ? DirectionError(requested, actual) : 0.0);
     refusal.reason =
         Text(
             "missed its request: the jump should be %.2f m long, but the nearest jump of "
             "the library is %.2f m long, ",
-            jump.length_m, got.z) +
+            jump.length_m, actual.z) +
         MissText(refusal);
     AddIfMissed(std::move(refusal));
   }
@@ -156,12 +158,12 @@ class RefusalFinder {
   void CheckStand(std::uint64_t id, const MovementRecord& record) {
     const Skeleton& skeleton = input_.library->skeleton();
     const double heading = record.base.heading_rad;
-    const DVec3 asked = FootVector(skeleton, input_.library->stand_pose(), Foot::kLeft, 0.0);
-    const DVec3 got = FootVector(skeleton, PoseAt(record.end_s), Foot::kLeft, heading);
+    const DVec3 requested = FootVector(skeleton, input_.library->stand_pose(), Foot::kLeft, 0.0);
+    const DVec3 actual = FootVector(skeleton, PoseAt(record.end_s), Foot::kLeft, heading);
     Refusal refusal{.request_id = id, .kind = "stand"};
-    refusal.asked = {{"left_ahead_m", asked.z}, {"left_aside_m", asked.x}};
-    refusal.got = {{"left_ahead_m", got.z}, {"left_aside_m", got.x}};
-    refusal.missed_m = Horizontal(got - asked);
+    refusal.requested = {{"left_ahead_m", requested.z}, {"left_aside_m", requested.x}};
+    refusal.actual = {{"left_ahead_m", actual.z}, {"left_aside_m", actual.x}};
+    refusal.missed_m = Horizontal(actual - requested);
     refusal.reason = Text(
         "does not bring the feet together: they stay %.2f m from their positions in the stand "
         "pose, because the library has no step that brings them closer",
@@ -173,17 +175,17 @@ class RefusalFinder {
     if (walk.arrived) return;
     const auto request = std::ranges::find(input_.requests, walk.request_id, &MovementRequest::id);
     if (request == input_.requests.end()) return;
-    const auto* asked = std::get_if<WalkRequest>(&request->movement);
-    if (asked == nullptr) return;
+    const auto* requested = std::get_if<WalkRequest>(&request->movement);
+    if (requested == nullptr) return;
     Refusal refusal{.request_id = walk.request_id, .kind = "walk_to"};
-    refusal.asked = {{"position_x_m", asked->position_m.x},
-                     {"position_z_m", asked->position_m.z},
-                     {"heading_rad", asked->heading_rad}};
-    refusal.got = {{"position_x_m", walk.base.position_m.x},
-                   {"position_z_m", walk.base.position_m.z},
-                   {"heading_rad", walk.base.heading_rad}};
-    refusal.missed_m = Horizontal(walk.base.position_m - asked->position_m);
-    refusal.missed_rad = std::fabs(WrapAngle(walk.base.heading_rad - asked->heading_rad));
+    refusal.requested = {{"position_x_m", requested->position_m.x},
+                         {"position_z_m", requested->position_m.z},
+                         {"heading_rad", requested->heading_rad}};
+    refusal.actual = {{"position_x_m", walk.base.position_m.x},
+                      {"position_z_m", walk.base.position_m.z},
+                      {"heading_rad", walk.base.heading_rad}};
+    refusal.missed_m = Horizontal(walk.base.position_m - requested->position_m);
+    refusal.missed_rad = std::fabs(WrapAngle(walk.base.heading_rad - requested->heading_rad));
     refusal.reason = "did not arrive: " + walk.reason + "; the walk ends " + MissText(refusal);
     refusals_.push_back(std::move(refusal));
   }
@@ -196,21 +198,21 @@ class RefusalFinder {
     const Footprint& nearest = skipped.missed.nearest;
     Refusal refusal{.request_id = skipped.request_id, .kind = step != nullptr ? "step" : "jump"};
     if (step != nullptr && step->at) {
-      const DVec3& asked = step->at->position_m;
-      refusal.asked = {{"at_x_m", asked.x}, {"at_z_m", asked.z}};
-      refusal.got = {{"at_x_m", nearest.position_m.x}, {"at_z_m", nearest.position_m.z}};
+      const DVec3& requested = step->at->position_m;
+      refusal.requested = {{"at_x_m", requested.x}, {"at_z_m", requested.z}};
+      refusal.actual = {{"at_x_m", nearest.position_m.x}, {"at_z_m", nearest.position_m.z}};
     } else {
-      const StepMeasures& asked = skipped.missed.requested;
-      const StepMeasures& got = skipped.missed.reached;
-      refusal.asked = {{"length_m", asked.length_m}, {"turn_rad", asked.turn_rad}};
-      refusal.got = {{"length_m", got.length_m}, {"turn_rad", got.turn_rad}};
+      const StepMeasures& requested = skipped.missed.requested;
+      const StepMeasures& actual = skipped.missed.reached;
+      refusal.requested = {{"length_m", requested.length_m}, {"turn_rad", requested.turn_rad}};
+      refusal.actual = {{"length_m", actual.length_m}, {"turn_rad", actual.turn_rad}};
       if (step != nullptr && step->side_m) {
-        refusal.asked.emplace_back("side_m", asked.side_m);
-        refusal.got.emplace_back("side_m", got.side_m);
+        refusal.requested.emplace_back("side_m", requested.side_m);
+        refusal.actual.emplace_back("side_m", actual.side_m);
       }
       if (input_.options.terrain == nullptr) {
-        refusal.asked.emplace_back("height_m", asked.height_m);
-        refusal.got.emplace_back("height_m", got.height_m);
+        refusal.requested.emplace_back("height_m", requested.height_m);
+        refusal.actual.emplace_back("height_m", actual.height_m);
       }
     }
     refusal.missed_m = skipped.missed.distance_m;

@@ -15,10 +15,11 @@ struct Refusal {
 
   std::uint64_t request_id = 0;
   std::string kind;  ///< "step", "jump", "stand" or "walk_to".
-  /// The request and the result. Both contain the same values, with units in their names, for
-  /// example length_m.
-  Values asked;
-  Values got;
+  /// Requested and actual values, by name. Both lists have the same names in the same order. The
+  /// names end in units, for example "length_m". If a step or jump was skipped, `actual` describes
+  /// the nearest one in reach.
+  Values requested;
+  Values actual;
   double missed_m = 0.0;  ///< Distance between the requested and the actual result.
   /// Angle between their directions of travel or between their headings, whichever is larger.
   /// Walks: angle between the headings. Stands: 0.

@@ -8,13 +8,15 @@
 namespace stridewire {
 namespace {
 
-// A closing step after another inserted step must bring the feet closer together by at least this.
+// A closing step after another inserted step must bring the feet closer together by at least this
+// distance.
 constexpr double kClosingGainM = 0.03;
 // If the forward distance between the feet at the end of a step differs from that of the stand pose
-// by at most this, the step needs no correction by planting.
+// by at most this distance, the step needs no correction by planting.
 constexpr double kClosedM = 0.03;
-// An avatar brings its feet together only if their heights then differ by at most this, or by no
-// more than they do now. It does not do so if one foot stands on a high, small stone, for example.
+// An avatar brings its feet together only if their heights then differ by at most this distance, or
+// by no more than they do now. It does not do so if one foot stands on a high, small stone, for
+// example.
 constexpr double kMaxStandClimbM = 0.15;
 
 // Returns the forward distance between the feet at the end of a planned step.

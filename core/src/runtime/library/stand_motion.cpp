@@ -242,7 +242,7 @@ class IdleGenerator {
     }
   }
 
-  // Sets the pose except for the legs.
+  // Sets the pose. The legs keep the local rotations of the stand pose.
   void PoseBody(double time_s) {
     pose_ = stand_;
     const double weight = WeightAt(std::fmod(time_s, kIdleLoopS));

@@ -23,7 +23,7 @@ inline constexpr double kMaxStepErrorRad = 0.015;
 /// because people do not climb stairs faster if the treads are short.
 inline constexpr double kUnhurriedClimbM = 0.08;
 
-/// A step that the library contains, and its result.
+/// A step that can be blended from a group of the library, and where it ends.
 struct PlannedStep {
   RequestPlan plan;
   Foot moved = Foot::kLeft;

@@ -187,7 +187,7 @@ struct FeetPositions {
 void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes,
                  const FeetPositions& feet);
 
-/// A block of poses to plant in place.
+/// A block of poses whose feet are to be planted. PlantPoses modifies the poses in place.
 struct PlantPosesJob {
   const float* plan;     ///< [kPackedPlanFloats][kBlock]: transposed PackedFootPlan of each lane
   const double* time_s;  ///< [kBlock]: time since the start of the movement
@@ -199,7 +199,7 @@ struct PlantPosesJob {
 /// Plants the feet of the first `count` lanes, as PlantFeet does. `rig` must be usable.
 void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count);
 
-/// Arguments for planting the feet of one pose in place.
+/// One pose whose feet are to be planted. PlantPose modifies the pose in place.
 struct PlantPoseJob {
   const float* plan = nullptr;  ///< PackedFootPlan
   double time_s = 0.0;          ///< Time since the start of the movement

@@ -33,8 +33,10 @@ enum class StatusCode : std::uint16_t {
   /// The request was cancelled or replaced, or its avatar was removed.
   kDropped = 116,
   // Codes 200 to 299: the data is invalid.
-  kMalformed = 200,   ///< The bytes violate the protocol standard (STANDARD.md).
-  kNoMovement = 201,  ///< The library has no such movement or layer.
+  kMalformed = 200,  ///< The bytes violate the protocol standard (STANDARD.md).
+  /// The library has no such movement or layer, or the command needs foot planting, which is off or
+  /// not supported by the skeleton.
+  kNoMovement = 201,
   // Codes 300 to 399: the network failed.
   kTimeout = 300,  ///< Nothing was received for longer than the timeout.
   kTooSlow = 301,  ///< The peer does not read fast enough.

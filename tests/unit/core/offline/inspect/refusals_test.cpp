@@ -60,8 +60,8 @@ TEST_P(TooLongSteps, AreListedWithTheirResult) {
   const Refusal& refusal = refusals.front();
   EXPECT_EQ(refusal.request_id, 2u);
   EXPECT_EQ(refusal.kind, "step");
-  EXPECT_DOUBLE_EQ(ValueOf(refusal.asked, "length_m"), 1.5);
-  EXPECT_NEAR(ValueOf(refusal.got, "length_m"), 0.8, 0.1);
+  EXPECT_DOUBLE_EQ(ValueOf(refusal.requested, "length_m"), 1.5);
+  EXPECT_NEAR(ValueOf(refusal.actual, "length_m"), 0.8, 0.1);
   EXPECT_NEAR(refusal.missed_m, 0.7, 0.1);
   EXPECT_LT(refusal.missed_rad, 0.2);
   EXPECT_THAT(refusal.reason, testing::AnyOf(HasSubstr("1.50 m ahead of the other foot"),
@@ -85,7 +85,7 @@ TEST(Refusals, JumpsWalksAndSkippedStepsAreListedInOrder) {
       R"({"jump":{"length_m":4}}, {"step":{"at_m":[0,0,30],"heading_rad":0,"exact_only":true}})");
   ASSERT_THAT(refusals, SizeIs(2));
   EXPECT_EQ(refusals[0].kind, "jump");
-  EXPECT_LT(ValueOf(refusals[0].got, "length_m"), 2.0);
+  EXPECT_LT(ValueOf(refusals[0].actual, "length_m"), 2.0);
   EXPECT_EQ(refusals[1].request_id, 2u);
   EXPECT_THAT(refusals[1].reason, HasSubstr("was skipped: "));
 }
