@@ -211,6 +211,13 @@ class StepGenerator {
   [[nodiscard]] double ShareAt(double time_s) const {
     return start_share_ + (end_share_ - start_share_) * SmootherStep(time_s / end_s_);
   }
+  // Weight of the captured stride for the rotations of the root and the upper body. They shrink
+  // less than the step: if straight strides of people are shorter, the ranges of pelvis yaw, pelvis
+  // obliquity, trunk lean and arm swing are almost as large (decision 0035).
+  [[nodiscard]] double BodyShareAt(double time_s) const {
+    const double share = std::min(1.0, ShareAt(time_s));
+    return share * (2.0 - share);
+  }
   [[nodiscard]] double HeadingAt(double time_s) const {
     return feet_.turn_rad * SmootherStep(time_s / end_s_);
   }
@@ -392,19 +399,21 @@ class StepGenerator {
     return Blend(person_.stand.rotations[joint], sample_.rotations[joint], share);
   }
   [[nodiscard]] DQuat RootRotationAt(double time_s) const {
-    return Turned(HeadingAt(time_s), MixedRotation(0, std::min(1.0, ShareAt(time_s))));
+    return Turned(HeadingAt(time_s), MixedRotation(0, BodyShareAt(time_s)));
   }
 
   // Sets the rotations of all joints before inverse kinematics.
   void SetPosture(double time_s, PoseSpan posture) {
-    const double share = std::min(1.0, ShareAt(time_s));
+    const double share = BodyShareAt(time_s);
     std::vector<DQuat>& mixed = mixed_;
     mixed.resize(posture.rotations.size());
     for (std::size_t j = 0; j < mixed.size(); ++j) mixed[j] = MixedRotation(j, share);
-    const double leg_share = LegShareAt(moving_, time_s);
-    for (const int joint : person_.rig.side(moving_).chain) {
-      const auto j = static_cast<std::size_t>(joint);
-      mixed[j] = MixedRotation(j, leg_share);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const double leg_share = LegShareAt(foot, time_s);
+      for (const int joint : person_.rig.side(foot).chain) {
+        const auto j = static_cast<std::size_t>(joint);
+        mixed[j] = MixedRotation(j, leg_share);
+      }
     }
     mixed[0] = RootRotationAt(time_s);
     const double heading = HeadingAt(time_s);

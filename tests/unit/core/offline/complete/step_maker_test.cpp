@@ -75,6 +75,28 @@ TEST(StepMaker, FeetDoNotArriveEarlierThanCapturedOnes) {
   EXPECT_NEAR(AheadAt(walker, late, late.keytimes_s.back()), length_m, 1e-4);
 }
 
+// The pelvis of a person turns and tilts almost as far in short strides as in long ones.
+TEST(StepMaker, PelvisTurnsAlmostAsFarInShortStrides) {
+  const Walker walker;
+  // Returns the largest angle between the rotations of the pelvis in a stride and in the stand.
+  const auto turned_rad = [&](double length_m) {
+    const RawExample stride = walker.Stride(length_m);
+    double largest = 0.0;
+    for (int i = 0; i < stride.clip.frame_count(); ++i) {
+      const DQuat turn = glm::conjugate(walker.person.stand.rotations[0]) *
+                         DQuat(stride.clip.frame(i).rotations[0]);
+      largest = std::max(
+          largest, 2.0 * std::asin(std::min(1.0, glm::length(DVec3(turn.x, turn.y, turn.z)))));
+    }
+    return largest;
+  };
+  const double full_m = walker.person.strides[0].end_length_m;
+  const double full_rad = turned_rad(full_m);
+  ASSERT_GT(full_rad, 0.03);
+  EXPECT_GT(turned_rad(0.6 * full_m), 0.75 * full_rad);
+  EXPECT_LT(turned_rad(0.3 * full_m), 0.8 * full_rad);
+}
+
 TEST(StepMaker, ToesBendWhereTheirTipsWouldSink) {
   Walker walker;
   for (StrideModel& stride : walker.person.strides) {
