@@ -47,6 +47,11 @@ struct Choice {
   bool has_layer = false;
 };
 
+// Generated steps last for multiples of 1/120 s, so frames at 60 Hz could coincide with ends of
+// movements. Rounding errors would then decide which movement a frame shows, and how many frames
+// there are.
+constexpr double kFps = 59.3;
+
 std::vector<Choice> Choreographies() {
   const std::vector<MovementRequest> steps = {
       {1, StepRequest{.length_m = 0.4}},
@@ -64,7 +69,7 @@ std::vector<Choice> Choreographies() {
 }
 
 Expected<Synthesis> Play(const Library& library, const Choice& choice) {
-  SynthesisInput input{.library = library, .requests = choice.requests};
+  SynthesisInput input{.library = library, .requests = choice.requests, .fps = kFps};
   Random random(5);
   if (choice.has_terrain) input.options.terrain = RoughGround(random);
   std::vector<LayerCue> cues;
