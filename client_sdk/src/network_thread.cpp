@@ -175,8 +175,8 @@ struct NetworkThread::Impl {
                       [this, c](const error_code& error, std::size_t) {
                         if (!IsCurrent(c)) return;
                         c->writing = false;
-                        // The error is ignored here, because the read reports it as well, after it
-                        // has returned the last messages of the server.
+                        // The error is ignored here, because the read operation also reports it
+                        // after the last messages of the server.
                         if (error) return;
                         {
                           const std::lock_guard lock(mutex);

@@ -15,8 +15,8 @@ namespace stridewire::client {
 ///
 /// d approaches the target at a rate of at most kMaxRate, so the display runs at most 5 % faster or
 /// slower than the server. It jumps only if the server's clock has changed, if all messages of the
-/// last kResyncS arrived too late by more than kSnapS, or if d has exceeded its target by more than
-/// kMaxExcessS for kResyncS.
+/// last kResyncS arrived more than kSnapS too late, or if, for kResyncS, d has exceeded its target
+/// by more than kMaxExcessS.
 ///
 /// No delay can cover a stall of the link. The messages that arrive after a stall are therefore
 /// ignored until they are on time again.

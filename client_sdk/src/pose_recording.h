@@ -88,8 +88,9 @@ class PoseRecording {
     std::deque<Tick> ticks;
     std::vector<std::unique_ptr<Decoded>> decoded;
   };
-  /// The ticks of a stream before and after a time, between which poses are interpolated. A pointer
-  /// is null if there is no such tick, or if there is a discontinuity between it and the time.
+  /// The ticks of a stream around a time. Poses are interpolated between them. A pointer is null if
+  /// the stream has no such tick, or if a discontinuity separates it from the time. All are null if
+  /// the time is more than kKeepS after the newest tick.
   struct Neighbours {
     const Decoded* start = nullptr;
     bool exact = false;  ///< True if `start` is exactly at the time. The others are then null.

@@ -66,7 +66,8 @@ class WorldView : public PoseSink {
     kWhenSampled,  ///< When they are read. For applications that sample all avatars per frame.
   };
 
-  /// `recording` defines the limits of the view's recording. By default nothing is recorded.
+  /// `recording` is the empty recording of the view, with its limits. By default, nothing is
+  /// recorded.
   WorldView(std::size_t pose_history, PoseBudget& budget,
             PoseRecording recording = PoseRecording(0.0, 0),
             Evaluation evaluation = Evaluation::kEveryTick)

@@ -64,7 +64,7 @@ class PoseSink {
 /// Used by the client library and by stridewire-load. Not thread-safe.
 class ReplicaSet {
  public:
-  /// Maximum number of shards. A message of any further shard is an error.
+  /// Maximum number of shards. A message from any further shard is an error.
   static constexpr std::size_t kMaxShards = 1024;
 
   /// Evaluates at most `max_avatars` avatars and ignores further ones. Each takes about 13 KB.

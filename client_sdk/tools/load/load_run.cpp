@@ -229,8 +229,8 @@ bool LoadRun::Resolve() {
 
 void LoadRun::MakeSessions() {
   for (int i = 0; i < options_.threads; ++i) workers_.push_back(std::make_unique<Worker>());
-  // The first observer measures latency if it observes all worlds. Otherwise, one observer per
-  // world does. These observers run on the thread of the controllers.
+  // The first observer measures latency if it observes all worlds. Otherwise, up to one observer
+  // per world does. These observers run on the thread of the controllers.
   const bool measures = options_.observers > 0;
   if (measures) probes_.emplace(static_cast<std::size_t>(options_.avatars));
   const int measuring_count = options_.observe_all ? 1 : options_.worlds;

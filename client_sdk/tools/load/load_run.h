@@ -21,7 +21,7 @@ inline constexpr double kScrapeTimeoutS = 2.0;
 
 /// Generates load on a server and returns the measurements. Failures are in `errors` and `failed`
 /// of the report. Blocks until the run has ended. If `choreography` is null, the avatars wander.
-/// `library` is needed only in mode movement. Setting `stop` ends the run early. `progress` is
+/// `library` is needed only in movement mode. Setting `stop` ends the run early. `progress` is
 /// called with one line of text per second.
 [[nodiscard]] LoadReport RunLoad(const LoadOptions& options, const Choreography* choreography,
                                  std::shared_ptr<const MotionLibrary> library,

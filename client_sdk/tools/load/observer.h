@@ -38,7 +38,7 @@ class Observer final : public Session {
  public:
   static constexpr double kMaxSpeedMPerS = 15.0;
   static constexpr double kSpeedSlackM = 0.05;
-  /// Time after a reconnect in which missing poses are not errors. In mode movement, the state of
+  /// Time after a reconnect in which missing poses are not errors. In movement mode, the state of
   /// an avatar arrives at least one tick after the first message.
   static constexpr double kReconnectS = 1.0;
 
@@ -88,7 +88,7 @@ class Observer final : public Session {
     std::vector<std::size_t> last_sizes;
     std::size_t max_pose_bytes = 0;
     std::vector<Stream> streams;
-    /// Evaluates poses from movements. Not null in mode movement.
+    /// Evaluates poses from movements. Not null in movement mode.
     std::unique_ptr<client::ReplicaSet> replicas;
     /// Number of dropped batches that the server reported on this connection.
     std::uint64_t batches_dropped = 0;

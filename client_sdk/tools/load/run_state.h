@@ -85,7 +85,7 @@ struct RunState {
   const LoadOptions& options;
   /// Choreography of the avatars. Null: the avatars wander.
   const Choreography* choreography;
-  /// Library for evaluating poses. Set in mode movement.
+  /// Library for evaluating poses. Set in movement mode.
   const std::shared_ptr<const MotionLibrary> library;
   const Layout layout;
   TickWindow window;

@@ -66,7 +66,7 @@ namespace Stridewire
         Jump = 1,
         /// <summary>Stand for a given time.</summary>
         Stand = 2,
-        /// <summary>Walk with as many steps as needed to a position and heading.</summary>
+        /// <summary>Walk to a position and heading with as many steps as needed.</summary>
         Walk = 3,
     }
 
@@ -101,11 +101,12 @@ namespace Stridewire
         /// each joint and end site is at most 1 mm.</summary>
         Quantised = 1,
         /// <summary>The server sends movements, about 150 bytes per step, and the client evaluates
-        /// the poses. They equal those of STRIDEWIRE_FULL bit for bit. The client fetches the
-        /// world's library first, unless it is in `library_folder`. Until then, it delays this and
-        /// all later commands to the world. The reply is UNSUPPORTED, VERSION_MISMATCH or MALFORMED
-        /// if the client cannot use the library. An avatar costs the client about 1 us per tick and
-        /// up to 16 KiB. The client ignores avatars beyond `max_pose_bytes` / 16 KiB.</summary>
+        /// the poses. They equal those of STRIDEWIRE_FULL bit for bit. If the world's library is
+        /// not in `library_folder`, the client fetches it from the server. Until the library is
+        /// available, the client delays the subscription and all later commands to the world. If
+        /// the client cannot use the library, the reply to the subscription is UNSUPPORTED,
+        /// VERSION_MISMATCH or MALFORMED. An avatar costs the client about 1 us per tick and up to
+        /// 16 KiB. The client ignores avatars beyond `max_pose_bytes` / 16 KiB.</summary>
         Movement = 2,
     }
 
@@ -187,8 +188,8 @@ namespace Stridewire
         Idle = 36,
         /// <summary>Uses request_id, status, text, outcome. The avatar could not execute a queued
         /// request, or the request was dropped before it was completed (DROPPED). If a step or jump
-        /// is out of reach (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point in
-        /// reach), missed_m, missed_rad and nearest_*. At the end of a walk, also uses
+        /// is out of reach (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point
+        /// within reach), missed_m, missed_rad and nearest_*. At the end of a walk, also uses
         /// speed_m_s.</summary>
         Rejected = 37,
         /// <summary>Uses base. The avatar was spawned.</summary>

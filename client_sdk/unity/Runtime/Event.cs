@@ -71,7 +71,8 @@ namespace Stridewire
 
         public double BaseHeadingRad { get { return native.base_heading_rad; } }
 
-        /// <summary>Distance between the requested place and the nearest one in reach.</summary>
+        /// <summary>Distance between the requested place and the nearest one within reach.
+        /// </summary>
         public double MissedM { get { return native.missed_m; } }
 
         public double NearestLengthM { get { return native.nearest_length_m; } }

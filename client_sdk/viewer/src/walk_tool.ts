@@ -269,7 +269,7 @@ export class WalkTool {
     return goals;
   }
 
-  /** Call several times per second: updates the decals. */
+  /** Updates the decals. Must be called several times per second. */
   update(): void {
     const pending = this.pendingWaypoints;
     if (pending && this.target(pending.pane) !== pending.avatar) this.pendingWaypoints = null;

@@ -112,7 +112,7 @@ export class WorldPanes {
   private subscribe(pane: WorldPane): void {
     const {world, subscription: old} = pane;
     const {mode} = this.stream;
-    // Until the client has the motion library, it delays this command and all later ones.
+    // Until the client has the motion library, it delays the subscription and all later commands.
     const interim = old === null && mode === 'movement' ?
       world.observe(observationFor({...this.stream, mode: 'quantised', detail: 'all'})) : old;
     const subscription = pane.subscription = world.observe(observationFor(this.stream));

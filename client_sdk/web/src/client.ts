@@ -26,10 +26,10 @@ const maxBufferedBytes = 1 << 20;
  * tries them in order, and waits only after all of them have failed or after a lost connection.
  *
  * While there is no connection, new commands wait. After a reconnect, the server usually still has
- * the session. The client then sends commands without a reply again, and the server executes each
- * command once. The session is lost if the server was restarted or the interruption was too long.
- * Unanswered commands for avatars or terrain that were already sent then fail with `session_lost`,
- * and the client joins its worlds and starts its subscriptions again.
+ * the session. The client then resends all unanswered commands, and the server executes each of
+ * them once. If the server was restarted or the interruption was too long, the session is lost. The
+ * client then joins its worlds and starts its subscriptions again. If it had sent a command for
+ * avatars or terrain and the server had not answered it, the command fails with `session_lost`.
  *
  * Only the constructor throws, and promises of commands never reject, unless the WebAssembly module
  * has stopped because of an internal error.
@@ -121,7 +121,7 @@ export class Client {
    * - in a new session,
    * - if the server's clock has changed by more than 0.25 s,
    * - if all poses of the last second arrived more than 0.25 s too late, or
-   * - if the delay has been more than 0.5 s longer than necessary for one second.
+   * - if, for one second, the delay has been more than 0.5 s longer than necessary.
    *
    * A jump starts a new segment of poses.
    */

@@ -70,7 +70,7 @@ export interface ClientOptions {
    * positions. Default false.
    */
   respawn?: boolean;
-  /** Limit of commands without a reply, 1 to 2^20. Further ones fail with `commands_full`.
+  /** Limit of unanswered commands, 1 to 2^20. Further ones fail with `commands_full`.
    * Default 4096. */
   maxCommands?: number;
   /** Received poses to keep per avatar for interpolation, 4 to 4096. Default 32. */
@@ -113,9 +113,9 @@ export interface ClientListeners {
    */
   connected: (resumed: boolean) => void;
   /**
-   * Called when the server no longer has the previous session. Unanswered commands for avatars or
-   * terrain that were already sent fail with `session_lost`. The client joins its worlds and starts
-   * its subscriptions again.
+   * Called when the server no longer has the previous session. The client joins its worlds and
+   * starts its subscriptions again. If it had sent a command for avatars or terrain and the server
+   * had not answered it, the command fails with `session_lost`.
    */
   sessionLost: () => void;
   /**

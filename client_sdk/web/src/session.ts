@@ -90,7 +90,7 @@ export class Session {
     });
   }
 
-  /** Ends the session with Goodbye. Commands without a reply fail with `cancelled`. */
+  /** Ends the session with Goodbye. Unanswered commands fail with `cancelled`. */
   close(nowS: number): void {
     this.run(() => native().call.close(this.client, nowS));
   }

@@ -107,8 +107,8 @@ export type LayerRequest =
  *
  * Unless `allowNearest` is true, a step or jump is rejected when it is about to start if the motion
  * library would miss its place by more than 0.2 m, or its direction or heading by more than 60
- * degrees. The event `rejected` contains the nearest one in reach. Smaller errors are visible in
- * `WorldEvent.applied`.
+ * degrees. The event `rejected` contains the nearest one within reach. Smaller errors are visible
+ * in `WorldEvent.applied`.
  */
 export interface MovementRequest
     extends Given<Omit<RequestItem, 'avatar' | 'requestId' | 'type'>> {

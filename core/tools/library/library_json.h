@@ -20,14 +20,15 @@ namespace stridewire {
 // Serializes JSON that may contain text from a file; invalid UTF-8 is replaced.
 [[nodiscard]] std::string Dump(const nlohmann::ordered_json& json);
 
-// Return the layers of a library as JSON, or print them on stdout.
+// Returns the layers of a library as JSON.
 [[nodiscard]] nlohmann::ordered_json LayersToJson(const MotionLibrary& library);
+// Prints the layers of a library to stdout.
 void PrintLayers(const MotionLibrary& library);
 
-// Return the transitions of a library as JSON, with one entry per pair of groups, or print them on
-// stdout. The text has the best transition per pair of movement kinds, and with `examples` also the
-// two examples that the transition connects.
+// Returns the transitions of a library as JSON, with one entry per pair of groups.
 [[nodiscard]] nlohmann::ordered_json TransitionsToJson(const MotionLibrary& library);
+// Prints the best transition per pair of movement kinds to stdout. With `examples`, also prints the
+// two examples that each transition connects.
 void PrintTransitions(const MotionLibrary& library, bool examples);
 
 }  // namespace stridewire

@@ -5,8 +5,9 @@
 
 namespace stridewire {
 
-// Print on stdout what a library can do and what is missing, and the results of its self-check.
+// Prints a summary of a library, including what it lacks, to stdout.
 void PrintSummary(const LibrarySummary& summary);
+// Prints the results of a self-check to stdout.
 void PrintSelfCheck(const SelfCheck& check);
 
 }  // namespace stridewire

@@ -57,7 +57,7 @@ class Shard : public SessionHost {
 
   /// Sends a message to this shard, which handles it on its own thread.
   void Post(ShardMessage message);
-  /// Passes a client that has sent Hello to this shard.
+  /// Passes a client to this shard. The client has already sent its Hello.
   void Adopt(Arrival arrival);
   /// Ends all sessions after answering their pending commands.
   void Drain();

@@ -196,7 +196,8 @@ void Connection::ScheduleFlush(double wait_s) {
   });
 }
 
-// If frames wait already, the earlier of both times applies.
+// Delays queued frames by up to `wait_s`. If frames are already waiting, the earlier of the two
+// deadlines applies.
 void Connection::Wait(double wait_s) {
   const auto until = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                         std::chrono::duration<double>(wait_s));

@@ -203,9 +203,9 @@ void EncodedPoseCache::FinishStep() {
                                 static_cast<int>(max_count));
     poses += static_cast<std::size_t>(item.count);
   }
-  // Poses of a whole crowd may be needed at once, because a client starts to observe it or because
-  // it was interrupted. In this case, slots outside their phase get only one pose, so that a tick
-  // evaluates hardly more than two poses per avatar.
+  // Poses of a whole crowd may be needed in one tick, because a client starts to observe the crowd
+  // or because the movements of the crowd were interrupted. In this case, slots outside their phase
+  // get only one pose, so that a tick evaluates hardly more than two poses per avatar.
   const bool is_crowd_new = poses > 2 * avatar_count_ + kLanes * kMaxTicksAhead;
   for (Scheduled& item : scheduled_) {
     const SlotState& state = slots_[item.slot];

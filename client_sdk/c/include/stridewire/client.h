@@ -32,11 +32,12 @@
 /// Commands are queued while there is no connection. If there are several servers, see
 /// stridewire_client_connect_any. After a reconnect:
 ///   - If the server still has the session, it resumes (STRIDEWIRE_EVENT_CONNECTED with `resumed`).
-///     The client sends unanswered commands again, and the server executes each of them once.
+///     The client resends unanswered commands, and the server executes each of them once.
 ///   - Otherwise the session is lost (STRIDEWIRE_EVENT_SESSION_LOST), for example because the
 ///     server restarted. The client joins its worlds and observes again. With `respawn` it also
-///     spawns its avatars again, each at its last known base frame. Unanswered commands for avatars
-///     or terrain that were already sent end with STRIDEWIRE_SESSION_LOST.
+///     spawns its avatars again, each at its last known base frame. If the client had sent a
+///     command for avatars or terrain and the server had not answered it, the command ends with
+///     STRIDEWIRE_SESSION_LOST.
 ///
 /// Units are metres, seconds and radians. Axes are right-handed with +Y up. Heading 0 faces +Z, and
 /// a positive heading turns to the left. Quaternions are unit quaternions stored as x, y, z, w.
@@ -211,8 +212,9 @@ stridewire_status stridewire_client_remove(stridewire_client* client, stridewire
 /// Requests movements. An avatar may appear several times and executes its movements in order.
 /// Steps of a walk appear in events with the request id of the walk. A walk ends with FINISHED of
 /// kind STAND when the avatar has arrived, or with REJECTED if it cannot continue. Steps and jumps
-/// that are out of reach end with REJECTED, which contains the nearest one in reach. Requests that
-/// are dropped before they are completed also end with REJECTED; see `outcome` of stridewire_event.
+/// that are out of reach end with REJECTED, which contains the nearest one within reach. Requests
+/// that are dropped before they are completed also end with REJECTED; see `outcome` of
+/// stridewire_event.
 ///
 /// If the library cannot walk at a requested speed, REPLY has the status OK and a `text` that
 /// states the possible speeds. ACCEPTED then has `clamped` and the nearest possible speed.
@@ -314,7 +316,7 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_IDLE = 36,  ///< Uses base. The avatar stands and its queue is empty.
   /// Uses request_id, status, text, outcome. The avatar could not execute a queued request, or the
   /// request was dropped before it was completed (DROPPED). If a step or jump is out of reach
-  /// (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point in reach), missed_m,
+  /// (OUT_OF_RANGE), also uses foot, kind, position_m (the nearest point within reach), missed_m,
   /// missed_rad and nearest_*. At the end of a walk, also uses speed_m_s.
   STRIDEWIRE_EVENT_REJECTED = 37,
   STRIDEWIRE_EVENT_SPAWNED = 38,  ///< Uses base. The avatar was spawned.
@@ -385,14 +387,15 @@ typedef struct stridewire_event {
   double rtt_s;                     ///< Round-trip time of a ping.
   uint64_t dropped_batches;         ///< Pose batches that the server has dropped since the join.
   uint64_t dropped_events;          ///< Events that the server has dropped since the join.
-  uint64_t events_dropped_before;  ///< Events that the full queue dropped directly before this one.
+  /// Number of events dropped directly before this one because the queue was full.
+  uint64_t events_dropped_before;
   char text[STRIDEWIRE_MAX_TEXT_BYTES];
-  /// Distance between the requested place and the nearest one in reach, in metres.
+  /// Distance between the requested place and the nearest one within reach, in metres.
   double missed_m;
   /// Angle between the requested and the nearest direction, or between the headings, whichever is
   /// larger.
   double missed_rad;
-  /// The members nearest_* describe the nearest step or jump in reach, like those of
+  /// The members nearest_* describe the nearest step or jump within reach, like those of
   /// stridewire_movement.
   double nearest_length_m;
   double nearest_side_m;
@@ -518,7 +521,7 @@ stridewire_status stridewire_client_server_time(stridewire_client* client, doubl
 ///   - in a new session,
 ///   - if the server's clock has changed by more than 0.25 s,
 ///   - if all poses of the last second arrived more than 0.25 s too late, or
-///   - if the delay has been more than 0.5 s longer than necessary for one second.
+///   - if, for one second, the delay has been more than 0.5 s longer than necessary.
 /// A jump starts a new segment of poses.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
 

@@ -31,7 +31,7 @@ typedef enum stridewire_movement_type {
   STRIDEWIRE_STEP = 0,   ///< Step with given parameters or to a given footprint.
   STRIDEWIRE_JUMP = 1,   ///< Jump with both feet.
   STRIDEWIRE_STAND = 2,  ///< Stand for a given time.
-  STRIDEWIRE_WALK = 3,   ///< Walk with as many steps as needed to a position and heading.
+  STRIDEWIRE_WALK = 3,   ///< Walk to a position and heading with as many steps as needed.
   STRIDEWIRE_MOVEMENT_TYPE_MAX = 0x7fffffff
 } stridewire_movement_type;
 
@@ -154,11 +154,12 @@ typedef enum stridewire_pose_mode {
   /// site is at most 1 mm.
   STRIDEWIRE_QUANTISED = 1,
   /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
-  /// equal those of STRIDEWIRE_FULL bit for bit. The client fetches the world's library first,
-  /// unless it is in `library_folder`. Until then, it delays this and all later commands to the
-  /// world. The reply is UNSUPPORTED, VERSION_MISMATCH or MALFORMED if the client cannot use the
-  /// library. An avatar costs the client about 1 us per tick and up to 16 KiB. The client ignores
-  /// avatars beyond `max_pose_bytes` / 16 KiB.
+  /// equal those of STRIDEWIRE_FULL bit for bit. If the world's library is not in `library_folder`,
+  /// the client fetches it from the server. Until the library is available, the client delays the
+  /// subscription and all later commands to the world. If the client cannot use the library, the
+  /// reply to the subscription is UNSUPPORTED, VERSION_MISMATCH or MALFORMED. An avatar costs the
+  /// client about 1 us per tick and up to 16 KiB. The client ignores avatars beyond
+  /// `max_pose_bytes` / 16 KiB.
   STRIDEWIRE_MOVEMENT = 2,
   STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff
 } stridewire_pose_mode;

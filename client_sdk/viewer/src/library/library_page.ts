@@ -393,7 +393,7 @@ export class LibraryPage {
   }
 }
 
-/** Describes what a library can do, what is missing and the results of its self-check. */
+/** Describes what a library can do, what it lacks, and the results of its self-check. */
 export function summaryNodes({summary, self_check: check}: Summary): HTMLElement[] {
   const list = (items: readonly string[]): HTMLElement =>
     h('ul', {}, ...items.map((item) => h('li', {}, item)));

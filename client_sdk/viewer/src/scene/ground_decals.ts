@@ -179,7 +179,10 @@ export class GroundDecals {
     if (i > this.lastChanged) this.lastChanged = i;
   }
 
-  /** Uploads the decals that were set, and draws the first `count`. */
+  /**
+   * Uploads the decals that were set since the last call, and limits drawing to the first `count`
+   * decals.
+   */
   upload(count: number): void {
     this.count = Math.min(count, this.capacity);
     this.geometry.setDrawRange(0, this.count * 6);

@@ -22,7 +22,7 @@ enum class AvatarEventType : std::uint8_t {
   kFinished,  ///< A movement ended. The event contains the new base frame.
   kIdle,      ///< The avatar stands still and its queue is empty.
   /// The avatar could not execute a request. The event contains the code and the reason and, if a
-  /// step or jump is out of reach, the nearest one in reach. The avatar continues with the next
+  /// step or jump is out of reach, the nearest one within reach. The avatar continues with the next
   /// request.
   kRejected,
   /// A request was dropped before it was completed. The event contains the outcome and the reason.
@@ -58,16 +58,17 @@ struct StepMeasures {
 /// Describes by how much a rejected step or jump would have missed its request. For steps with
 /// `exact_only` the values are exact. For others, they are accurate to a few centimetres.
 struct FootprintError {
-  /// Nearest footprint in reach. For a jump: position and heading of the base frame after the
+  /// Nearest footprint within reach. For a jump: position and heading of the base frame after the
   /// nearest jump.
   Footprint nearest;
   double distance_m = 0.0;  ///< Distance from `nearest` to the requested place, >= 0.
   /// The larger of two angles: between the directions of the requested and the nearest path, and
   /// between the headings at their ends. With `exact_only`: only the latter. >= 0.
   double turn_rad = 0.0;
-  /// Measures of the request, relative to the fixed foot (step) or to the start (jump).
+  /// Length, side, height and turn of the request, relative to the fixed foot (step) or to the
+  /// start (jump).
   StepMeasures requested;
-  StepMeasures reached;       ///< Measures of the nearest step or jump.
+  StepMeasures reached;       ///< The same values of the nearest step or jump.
   bool is_footprint = false;  ///< The request was a step to a footprint.
 };
 
@@ -156,8 +157,8 @@ class AvatarSimulation;
 class Avatar {
  public:
   static constexpr int kMaxQueue = 1024;
-  /// Maximum number of events of one Advance, not counting the events of requests that were dropped
-  /// before it.
+  /// Maximum number of events per Advance, not counting events of requests that were dropped since
+  /// the previous Advance.
   static constexpr std::size_t kMaxEventsPerAdvance = 16;
 
   /// Creates an avatar that stands at `start` in the library's stand pose. `library` must not be

@@ -94,8 +94,8 @@ enum class Interrupt : std::uint8_t {
   kAfterMovement,
   /// The request begins at once if both feet stand, and otherwise as soon as they have landed. A
   /// jump in progress continues to its landing. A requested stand waits for the end of the current
-  /// step or jump if it ends with the feet together, or if the feet were together before it and
-  /// none has left the ground yet. The queue is dropped.
+  /// step or jump if that movement ends with the feet together, or if the feet were together before
+  /// it and none has left the ground yet. The queue is dropped.
   ///
   /// While more than 40 % of a swing remains, a requested step of the swinging foot redirects this
   /// foot to the new footprint. If feet are planted, a walk that begins with a step of this foot

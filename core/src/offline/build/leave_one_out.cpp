@@ -69,8 +69,8 @@ struct GroupOfOthers {
   MotionGroup group;  // Its spans refer to the other members.
 };
 
-// Fits a group to sites. Row `site` of `shares` [site][example] contains the weights of the
-// examples that the site stands for.
+// Fits a group to sites. Row `site` of `shares` [site][example] contains the weights with which the
+// site blends the examples.
 std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<const double> sites,
                                          std::span<const double> shares, bool is_smooth) {
   const std::vector<double> scales = ScalesOf(original);

@@ -24,7 +24,7 @@ namespace stridewire {
   return metric;
 }
 
-// Copies the parameters of a point.
+// Converts a point of the parameter space to ParameterValues.
 [[nodiscard]] inline ParameterValues ValuesOf(std::span<const double> point) {
   ParameterValues values{.count = static_cast<int>(point.size())};
   std::copy(point.begin(), point.end(), values.values.begin());

@@ -241,9 +241,9 @@ class GroupRefiner {
     }
   }
 
-  // Measures the group with samples of another seed. If they exceed the requested error or the
-  // limits, adds the worst of them to the samples and updates `survey`. Returns true if the largest
-  // error in `survey` is then too large.
+  // Measures the group with samples of another seed. If these samples exceed the requested error
+  // or the limits, adds the worst of them to the samples and updates `survey`. Returns true if the
+  // largest error in `survey` is then too large.
   bool OtherSamplesFindMore(const Candidate& current, int check, HullSurvey& survey) {
     const std::vector<ParameterValues> others = SampleHull(
         current.group, 2 * options_.samples, options_.seed + static_cast<std::uint32_t>(check));

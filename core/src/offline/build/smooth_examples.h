@@ -89,9 +89,9 @@ struct SmoothBasis {
 // Fits the weights of a library to smooth examples [count][d] with CardinalBasisFit. With three or
 // more parameters, the radii are multiplied by up to 1.5, as long as the sum of |w| at samples
 // stays within 2.4 (kMaxCorrectedWeightSum allows 2.5) and the condition number below 1000. Wider
-// radii are necessary because few sites in many dimensions are far apart, except for the nearest
-// ones. With radii equal to the distance of the nearest site, only the linear part would act in
-// most of the hull.
+// radii are necessary because a small number of sites is sparse in a space of many dimensions. If
+// each radius were the distance to the nearest site, only the linear part would act in most of the
+// hull.
 [[nodiscard]] Expected<SmoothBasis> FitSmoothBasis(std::span<const double> sites,
                                                    std::span<const double> scales);
 

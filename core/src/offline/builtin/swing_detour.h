@@ -36,9 +36,10 @@ template <class NearestM>
   return best_m;
 }
 
-/// Same as FindDetour, but refines the result by bisection, so it need not be a multiple of
-/// `step_m`, and rounding errors of distances hardly change it. The feet may be kSmallestGainM
-/// closer than `clearance_m`, or than the largest distance found if `clearance_m` is out of reach.
+/// Same as FindDetour, but refines the result by bisection. The result therefore need not be a
+/// multiple of `step_m`, and rounding errors of distances hardly change it. The feet may be
+/// kSmallestGainM closer than `clearance_m`, or than the largest distance found if `clearance_m` is
+/// out of reach.
 template <class NearestM>
 [[nodiscard]] double FindExactDetour(const DetourRange& range, const NearestM& nearest_m) {
   constexpr int kBisections = 14;

@@ -174,8 +174,8 @@ FoundLeg FindLegAboveAnkle(const FigureShape& figure, const std::vector<int>& jo
     if (may_be_knee(i)) knee = i;
   }
   if (knee == 0) knee = 1;
-  // The thigh may consist of several collinear joints. Its upper end is the first of them whose
-  // name belongs to the leg.
+  // The thigh may consist of several collinear joints. Its upper end is the first of
+  // these joints whose name belongs to the leg.
   std::size_t thigh = 0;
   for (const std::size_t end : chain.ends()) {
     if (end < knee) thigh = end;

@@ -116,7 +116,7 @@ Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> reques
           PathOf(static_cast<std::size_t>(request - requests.begin()), layers)};
 }
 
-// Sets the layers that start before a movement, except those that were already set for earlier
+// Sets the layers that start before a movement. Skips layers that were already set for earlier
 // movements.
 Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size_t& next,
                  AvatarSimulation& avatar) {

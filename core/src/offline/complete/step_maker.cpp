@@ -331,10 +331,10 @@ class StepGenerator {
     return root;
   }
 
-  // Returns how far the root is raised in the middle of the step so that the fixed leg bends as in
-  // a blend of the stand and the captured stride. The path of the root does not depend on the leg,
-  // so in short steps it would bend the leg further. Starts and stops are not corrected, because a
-  // rise would make the pelvis accelerate more.
+  // Returns how far the root is raised in the middle of the step so that the leg of the fixed foot
+  // bends as in a blend of the stand and the captured stride. The path of the root does not depend
+  // on the leg. Without a correction, the leg would therefore bend further in short steps. Starts
+  // and stops are not corrected, because a rise would make the pelvis accelerate more.
   [[nodiscard]] double StanceRiseAt(double time_s, const DVec3& root) const {
     const double fade_s = kStanceFade * end_s_;
     const double share = std::min(1.0, ShareAt(time_s));
@@ -602,7 +602,7 @@ class StepGenerator {
   double toe_off_s_ = 0.0;
   double strike_s_ = 0.0;
   double end_s_ = 0.0;
-  double stand_leg_m_ = 0.0;         // Distance from hip to ankle of the fixed leg in the stand.
+  double stand_leg_m_ = 0.0;         // Distance from hip to ankle of the fixed foot in the stand.
   std::array<double, 2> reach_m_{};  // [Foot]: largest distance from hip to ankle.
   // Smooth paths of the root from its first to its last position, with its velocities there.
   HermiteCurve captured_;          // In the captured stride.

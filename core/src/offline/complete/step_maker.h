@@ -49,9 +49,9 @@ struct StepSpec {
 ///
 /// The feet are placed first. The root then follows a cubic curve, plus w times the deviation of
 /// the captured root from such a curve. The height of the root is corrected so that both legs reach
-/// the feet and, in steps that neither start nor end in a stand, so that the fixed leg bends as in
-/// the blend. Finally, inverse kinematics sets the legs, and toes bend where they would be in the
-/// ground (RaiseToeTip).
+/// the feet and, in steps that neither start nor end in a stand, so that the leg of the fixed foot
+/// bends as in the blend. Finally, inverse kinematics sets the legs, and toes bend where they would
+/// be in the ground (RaiseToeTip).
 ///
 /// A step backward is a forward step from `feet.end_m` to `feet.start_m`, played more slowly and in
 /// reverse. Its moving foot is in front in `feet.start_m` and behind in `feet.end_m`, and it does

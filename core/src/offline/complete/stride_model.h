@@ -27,7 +27,7 @@ struct StrideModel {
   /// Sideways distance from the fixed to the moving foot, positive outward; mean of start and end.
   double width_m = 0.0;
 
-  /// [point]: distance from hip to ankle of the fixed leg. Set by MeasureLegs.
+  /// [point]: distance from hip to ankle of the fixed foot's leg. Set by MeasureLegs.
   std::vector<double> leg_m;
 
   /// Velocities of the root at the ends of the stride, in m/s. Set by JoinStrides: the velocity at
@@ -37,7 +37,7 @@ struct StrideModel {
 
   /// Returns the posture at a generic time in [0, 3].
   [[nodiscard]] PostureSample At(double generic_time) const;
-  /// Returns the distance from hip to ankle of the fixed leg at a generic time in [0, 3].
+  /// Returns the distance from hip to ankle of the fixed foot's leg at a generic time in [0, 3].
   [[nodiscard]] double LegAt(double generic_time) const;
   /// Writes the posture at a generic time in [0, 3] to `out`, whose memory it reuses.
   void Sample(double generic_time, PostureSample& out) const;
@@ -49,13 +49,14 @@ struct StrideModel {
   [[nodiscard]] DVec3 MeasuredEndVelocity() const;
 };
 
-/// Changes the strides of both feet so that each continues the other. The end of one and the start
-/// of the other are averages of different steps, so they differ. Both get the mean of their
-/// postures and velocities. The corrections fade out over 45 % of the duration of each stride, and
-/// those of the feet within double support.
+/// Changes the strides of both feet so that each continues the other. The end of one stride and
+/// the start of the other are averages of different steps, so they differ. Both get the mean of
+/// their postures and velocities. The corrections fade out over 45 % of the duration of each
+/// stride, and those of the feet within double support.
 void JoinStrides(std::array<StrideModel, 2>& strides);
 
-/// Measures the fixed legs of both strides, and sets StrideModel::leg_m.
+/// Measures the distance from hip to ankle of the fixed foot's leg at each point of both strides,
+/// and stores it in StrideModel::leg_m.
 void MeasureLegs(const Skeleton& skeleton, const LegRig& rig, std::array<StrideModel, 2>& strides);
 
 /// Returns the time of a point of a stride with these keytimes.

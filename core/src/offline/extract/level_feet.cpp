@@ -55,8 +55,8 @@ void FeetLeveller::Level(ExtractedExample& example, std::span<const ParameterNam
     }
     double root_m = 0.5 * (raise_m[0] + raise_m[1]);
     if (is_step) {
-      // In the middle of double support the moving foot carries half of the weight, and while it is
-      // in the air it carries none.
+      // In the middle of double support, the moving foot carries half of the weight. While the
+      // foot is in the air, it carries none.
       const double share =
           0.5 * (1.0 - Ramp(t, 0.0, flight.toe_off_s) + Ramp(t, flight.landing_s, end_s));
       const auto m = static_cast<std::size_t>(MovingFoot(example.kind));

@@ -17,12 +17,12 @@ struct Refusal {
   std::string kind;  ///< "step", "jump", "stand" or "walk_to".
   /// Requested and actual values, by name. Both lists have the same names in the same order. The
   /// names end in units, for example "length_m". If a step or jump was skipped, `actual` describes
-  /// the nearest one in reach.
+  /// the nearest one within reach.
   Values requested;
   Values actual;
   double missed_m = 0.0;  ///< Distance between the requested and the actual result.
-  /// Angle between their directions of travel or between their headings, whichever is larger.
-  /// Walks: angle between the headings. Stands: 0.
+  /// Angle between the requested and the actual direction of travel, or between the headings,
+  /// whichever is larger. Walks: angle between the headings. Stands: 0.
   double missed_rad = 0.0;
   /// A sentence without its subject, which is the movement: "did not arrive: ...".
   std::string reason;

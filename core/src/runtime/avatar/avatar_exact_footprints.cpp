@@ -25,8 +25,8 @@ constexpr int kChecks = 5;
 // height does not count as an error.
 constexpr double kLiftedM = 0.1;
 
-// A footprint in reach is found iteratively. A step aimed too far lands short of its target. A step
-// aimed at that landing place may land elsewhere again, because the library blends a different
+// A footprint within reach is found iteratively. A step aimed too far lands short of its target. A
+// step aimed at that landing place may again land elsewhere, because the library blends a different
 // step. Convergence is faster if the target is moved by kOvershoot times the error.
 constexpr int kMaxTries = 8;
 constexpr double kOvershoot = 1.5;

@@ -93,8 +93,8 @@ class AvatarReplica {
   /// A number that changes whenever a record contains a whole state, or starts or ends a movement.
   /// While it stays the same, the movement does not change.
   [[nodiscard]] std::uint32_t movement_number() const { return movement_number_; }
-  /// Time within the previous movement at which it ended or was interrupted when this one began.
-  /// Negative if this movement did not directly follow another one.
+  /// Time within the previous movement at which that movement ended or was interrupted. Negative if
+  /// the current movement did not directly follow another one.
   [[nodiscard]] double previous_end_s() const { return previous_end_s_; }
   /// Time within movement() at the last tick. Undefined if movement() is null.
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }

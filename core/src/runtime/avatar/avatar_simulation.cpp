@@ -445,7 +445,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
     step.at = FootprintOf(step);
   }
 
-  // A step to a footprint is planned relative to the staying foot.
+  // A step to a footprint is planned relative to the fixed foot.
   Footprint exact{step.at->position_m, step.at->heading_rad.value_or(base_.heading_rad)};
   exact.heading_rad = UnwrapAngle(exact.heading_rad, base_.heading_rad);
   if (options_.terrain != nullptr) {

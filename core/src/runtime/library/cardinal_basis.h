@@ -66,7 +66,7 @@ struct CardinalBasisFit {
   ///
   /// Errors: kShapeMismatch if the sizes of the spans do not match. kOutOfRange if a number is not
   /// finite, or if a scale or radius factor is not positive. kIllConditioned if two sites are
-  /// closer than kMinSiteDistance (index: the site), if the condition number of R is above
+  /// closer than kMinSiteDistance (Error::index is the site), if the condition number of R is above
   /// kMaxCondition, or if a coefficient is not finite.
   [[nodiscard]] Expected<CardinalBasis> Run() const;
 };

@@ -14,7 +14,7 @@ inline constexpr double kMinIntervalS = 1e-3;
 
 /// Checks the keytimes of a movement. Fails with kOutOfRange if there are fewer than 2 or more than
 /// kMaxIntervals + 1 keytimes, the first is not 0, an interval is shorter than kMinIntervalS
-/// (index: the interval), or a number is not finite.
+/// (Error::index is the interval), or a number is not finite.
 [[nodiscard]] Status ValidateKeytimes(std::span<const double> keytimes_s);
 
 /// Generic time, paper Eq. (3): g(t) = i + (t - K_i) / (K_{i+1} - K_i) for K_i <= t < K_{i+1}. t is

@@ -12,7 +12,7 @@
 namespace stridewire {
 namespace {
 
-// The joints from below the hip to the ankle, in order.
+// The joints of a leg without the hip, from the child of the hip to the ankle.
 struct LegChain {
   std::vector<std::size_t> joints;
   std::size_t knee = 0;  // Index in `joints`.

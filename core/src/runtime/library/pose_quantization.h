@@ -48,11 +48,11 @@ struct PoseQuantization {
 
 /// Chooses the joints to send for avatars that are far away from the viewer, in increasing order.
 ///
-/// A joint is omitted if displaying it and all joints below it in their reference rotations shifts
-/// no joint or end site by more than `largest_shift_m`. The shift caused by one joint is the chord
-/// of its largest rotation from the reference times the length of the chain below it. Shifts add up
-/// along a chain. The root and the parents of chosen joints are never omitted. The result is the
-/// same on every machine.
+/// A joint is omitted if no joint or end site shifts by more than `largest_shift_m` when the joint
+/// and all joints below it are displayed in their reference rotations. The shift caused by one
+/// joint is the chord of its largest rotation from the reference times the length of the chain
+/// below it. Shifts add up along a chain. The root and the parents of chosen joints are never
+/// omitted. The result is the same on every machine.
 [[nodiscard]] std::vector<std::uint16_t> ChooseReducedJoints(const Skeleton& skeleton,
                                                              std::span<const RotationRange> ranges,
                                                              double largest_shift_m);

@@ -4,9 +4,9 @@
 
 namespace stridewire {
 
-/// Measures how well movements of one group can follow movements of another group. The values are
-/// those of the best pair: an example of the first group, at its end, and an example of the second
-/// group, at its start.
+/// Measures how well movements of a second group can follow movements of a first group. The values
+/// are those of the best pair of examples: one of the first group at its end, and one of the second
+/// group at its start.
 struct Transition {
   /// In metres: root mean square distance of the joints, plus kTransitionVelocityS times that of
   /// their velocities. The poses are first moved to the same position, ground height and heading.

@@ -81,8 +81,8 @@ struct FootResidual {
 /// difference pose fades out. That would be too abrupt if the place is far away or if the root
 /// moves at another speed. The motion is horizontal, except where the root rises on terrain.
 struct RootApproach {
-  /// Displacement of the root relative to the standing feet that the difference pose causes at the
-  /// start of the movement.
+  /// Displacement of the root relative to the standing feet at the start of the movement, caused by
+  /// the difference pose.
   DVec3 offset_m = DVec3(0.0);
   DVec3 offset_m_s = DVec3(0.0);  ///< Velocity of this displacement at the start of the movement.
   /// Duration. If it is at most Movement::ease_out_s, there is no additional motion.

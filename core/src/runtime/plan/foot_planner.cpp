@@ -119,8 +119,8 @@ class Planner {
     return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
   }
 
-  // Chooses the base position so that the staying feet keep their positions, on average. Also
-  // computes the heights for Level. The feet stay until `stance_end_s`.
+  // Chooses the base position so that the standing feet keep their positions, on average.
+  // Also computes the heights for Level. The feet stand until `stance_end_s`.
   void SolveBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
     std::array<double, kStanceSamples.size()> times_s;
@@ -157,7 +157,7 @@ class Planner {
       level_[f] = LevellingQuartic(above_m, ranges);
     }
   }
-  // Returns the heights that keep the sole of a staying foot on the ground during the movement.
+  // Returns the heights that keep the sole of a standing foot on the ground during the movement.
   // Valid after SolveBase.
   const Quartic& Level(std::size_t foot) const { return level_[foot]; }
 

@@ -56,7 +56,7 @@ struct FootPlanJob {
 };
 
 /// Plans the feet of a movement. Sets `movement.feet`, the base position and the difference pose
-/// relative to the source. The base position is chosen so that the staying foot (in a jump or
+/// relative to the source. The base position is chosen so that the standing foot (in a jump or
 /// stand, the centre of both feet) keeps its place. Walks therefore do not drift. Never allocates.
 /// Returns the feet of the blended pose with its difference pose, at the start of the movement and
 /// kBlendStepS later.

@@ -13,10 +13,10 @@
 
 namespace stridewire {
 
-/// Computes the feet of a movement, before planting, at several times at once. It evaluates only
-/// the joints of the legs, with SIMD and one time per lane. The results have the same bits as those
-/// of EvaluateMovement or EvaluateBlend followed by FootOf. Getters take the index of a time in the
-/// last call of Sample.
+/// Computes the feet of a movement, before planting, at several times in one call. It evaluates
+/// only the joints of the legs, with SIMD and one time per lane. The results have the same bits as
+/// those of EvaluateMovement or EvaluateBlend followed by FootOf. Getters take the index of a time
+/// in the last call of Sample.
 class FootSampler {
  public:
   static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Maximum number of times per call.

@@ -119,8 +119,8 @@ struct FootprintOrigin {
   std::optional<std::size_t> after;
 };
 
-/// Plans a step to a footprint in world space, by converting it to a request relative to the
-/// staying foot, which is at `fixed_m`. `print.heading_rad` must be unwrapped to be close to
+/// Plans a step to a footprint in world space, by converting it to a request relative to the fixed
+/// foot, whose position is `fixed_m`. `print.heading_rad` must be unwrapped to be close to
 /// `heading_rad`, the heading of the body.
 [[nodiscard]] std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
                                                        const Footprint& print, const DVec3& fixed_m,

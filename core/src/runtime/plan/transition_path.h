@@ -45,7 +45,7 @@ struct TransitionPath {
 ///
 /// - A movement may follow another if MayFollow is true for their groups. If the best group for a
 ///   step may not follow, the step uses the best group that may, provided that the request is then
-///   in reach.
+///   within reach.
 /// - If the feet are apart, they must come together before a jump, and before a step of the foot
 ///   that moved last. This is not necessary if the forward distance between the feet differs by at
 ///   most 0.25 m from that at the start of the planned movement. In this case, if the request is in

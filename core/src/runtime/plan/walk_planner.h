@@ -90,8 +90,8 @@ inline constexpr int kMaxWalkCandidates = 256;
 
 /// Plans the next step of a walk towards the goal. Uses only steps that the library contains and
 /// ground that supports a foot. The remaining distance is divided into equal steps. If the library
-/// lacks the next of them, the planner compares shorter, longer and turning steps of either foot by
-/// the effort that remains after them.
+/// lacks the next of these steps, the planner compares shorter, longer and turning steps of either
+/// foot by the effort that remains after them.
 ///
 /// Every decision applies to one step only, so a changed terrain or goal takes effect with the next
 /// step. Never allocates. A call checks the ground at up to kMaxWalkCandidates footprints. On level

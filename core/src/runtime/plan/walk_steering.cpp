@@ -47,8 +47,10 @@ constexpr double kMaxShiftWithoutBackM = 1.3;
 constexpr double kBackM = 0.2;
 // The avatar does not turn towards a goal that is closer than this.
 constexpr double kShuffleM = 0.15;
+// The sideways distance between footprints exceeds that of a stand by at most 1.2 times this.
 constexpr double kSideStepM = 0.32;
-// A sideways distance is divided into steps of about this length.
+// A sideways distance is divided into equal parts that are at most slightly longer than this. Each
+// part takes a pair of steps: the outer foot moves first, and the other foot follows.
 constexpr double kLongSideStepM = 0.345;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;

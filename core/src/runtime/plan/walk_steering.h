@@ -21,7 +21,7 @@ struct WalkStep {
 /// of the LocomotionProfile. StepPlanner then checks which of these steps the library and the
 /// ground permit.
 ///
-/// The position of the body is derived from the staying foot, as if the other foot stood beside it.
+/// The position of the body is derived from the fixed foot, as if the other foot stood beside it.
 /// Each step moves the body by an equal part of the remaining distance. If the stand pose of the
 /// library is a stride (LocomotionProfile::stands_in_stride), the feet end in the same stride at
 /// the goal.

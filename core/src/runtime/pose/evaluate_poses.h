@@ -76,7 +76,7 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 inline constexpr double kBlendStepS = 0.004;
 
 /// Sets Movement::difference_velocity and Movement::is_inertial. The difference pose must be set.
-/// `before` is the pose of the previous movement at the start of this one, and `earlier` is the
+/// `before` is the pose of the previous movement at the start of `movement`, and `earlier` is the
 /// pose of the previous movement kBlendStepS before that. `scratch` has one rotation per joint.
 /// Does not allocate if the velocity has room for all joints.
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,

@@ -42,8 +42,8 @@ class LayerStack {
   };
 
   /// Starts, changes or ends a layer. If the layer is playing, it eases to the new weight and
-  /// speed. If it is easing out, it eases in again if it loops, and is otherwise started a second
-  /// time. Ending a layer that is not playing has no effect.
+  /// speed. If it is easing out, a looping layer eases in again, and any other layer is started a
+  /// second time. Ending a layer that is not playing has no effect.
   ///
   /// Errors: kNotFound if there is no such layer. kOutOfRange if a number is not finite or out of
   /// range. kLimitExceeded if another layer would have to start while kMaxLayers are playing. On

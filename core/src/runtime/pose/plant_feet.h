@@ -75,8 +75,8 @@ struct FeetCorrection {
                                          ConstPoseSpan pose);
 
 /// Sets the residuals of a movement's plan so that the corrections continue smoothly. `before`
-/// contains the corrections of the previous movement at the start of this one, and kBlendStepS
-/// earlier. `planned` contains the corrections of the new plan without residuals at the start, and
+/// contains the corrections of the previous movement at the start of `movement` and kBlendStepS
+/// earlier. `planned` contains the corrections of the new plan without residuals, at the start and
 /// kBlendStepS later. `blended` contains the feet without corrections at the times of `planned`. If
 /// both elements of an array are equal, the velocity is zero. A standing foot continues to descend
 /// at 0.5 m/s at most.

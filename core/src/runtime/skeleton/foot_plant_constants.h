@@ -26,9 +26,9 @@ inline constexpr double kSoftGroundM = 0.006;
 // distance of kNearPrintM from the footprint. The lift fades to zero at kFarFromPrintM.
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
-// If planting lifts a sole out of the ground, the root rises as well, but by less than this. If it
-// rose as far as the toes of a foot that pushes off, the body would rise and fall abruptly. The
-// knee of that leg bends more instead.
+// If planting lifts a sole out of the ground, the root rises as well, but by less than this. If
+// the root rose as far as the toes of a foot that pushes off, the body would rise and fall
+// abruptly. The knee of that leg bends more instead.
 inline constexpr double kRootFollowsLiftM = 0.01;
 // During a swing, the ground plane that limits the foot changes from that of the old footprint to
 // that of the new one. The change begins at kGroundBlendStart and takes kGroundBlendLength, as
@@ -38,8 +38,8 @@ inline constexpr double kGroundBlendLength = 0.4;
 // A foot that lands lower than it started descends after this fraction of the swing. A foot that
 // lands higher finishes its rise by the same fraction before the end of the swing.
 inline constexpr double kSinkStart = 0.35;
-// The root of a body that steps down descends after this fraction of the movement. If it descended
-// earlier, it would bend the knee of the leg that swings above the higher tread.
+// The root of a body that steps down descends after this fraction of the movement. If the root
+// descended earlier, the knee of the leg that swings above the higher tread would bend.
 inline constexpr double kRootSinkStart = 0.25;
 // A foot tilts with the slope of the ground on which it stands. From the middle of a swing until
 // kLandingTiltStart, it tilts only by this fraction of the slope. Otherwise, the ankle of a bent

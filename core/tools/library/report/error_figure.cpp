@@ -92,7 +92,7 @@ Figure ErrorFigure(const ErrorFigureInput& input) {
     figure.script = MapBlock("before", map_before) + MapBlock("after", map_after) +
                     SiteBlocks(before.group(group_index), axes, "before") +
                     SiteBlocks(group, axes, "after") + kPalette;
-    // Contour lines carry the same information without colour.
+    // Contour lines keep the figure readable without colour.
     figure.script += "set contour base\nunset surface\nset cntrparam levels incremental 0," +
                      Number(top_mm / 8.0) + "," + Number(top_mm) +
                      "\nset table $lines_before\nsplot $before u 1:2:3\nset table $lines_after\n"

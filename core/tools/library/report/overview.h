@@ -24,7 +24,7 @@ struct Section {
 
 [[nodiscard]] std::string SectionHtml(const Section& section);
 
-// Describes what the library can do, and what is missing.
+// Describes what the library can do and what it lacks.
 [[nodiscard]] Section SummarySection(const LibrarySummary& summary);
 
 [[nodiscard]] Section SelfCheckSection(const SelfCheck& check);
