@@ -10,6 +10,7 @@
 
 #include "captured_library.h"
 #include "leg_geometry.h"
+#include "pelvis_acceleration.h"
 #include "random.h"
 #include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/terrain.h"
@@ -26,7 +27,6 @@ constexpr double kMaxKneeDegPerS = 800.0;
 constexpr double kMaxAnkleDeg = 50.0;
 constexpr double kMaxAcceleration = 17.0;       // Of the pelvis, vertical, in m/s^2.
 constexpr double kMaxUsualAcceleration = 10.0;  // The same in 99 % of all frames.
-constexpr std::size_t kAveragedFrames = 5;
 // People take one tread at a time if two are higher than this.
 constexpr double kMaxClimbM = 0.18;
 
@@ -73,19 +73,8 @@ struct StairsMotion {
   double climb_m = 0.0;  // Largest height between footprints of successive steps.
 };
 
-// Measures the vertical acceleration of the pelvis, averaged over kAveragedFrames.
 void MeasurePelvis(const Clip& clip, StairsMotion& motion) {
-  std::vector<double> heights_m;
-  for (std::size_t f = 0; f + kAveragedFrames <= clip.root_positions_m.size(); ++f) {
-    double sum_m = 0.0;
-    for (std::size_t k = 0; k < kAveragedFrames; ++k) sum_m += clip.root_positions_m[f + k].y;
-    heights_m.push_back(sum_m / static_cast<double>(kAveragedFrames));
-  }
-  std::vector<double> accelerations;
-  for (std::size_t f = 1; f + 1 < heights_m.size(); ++f) {
-    const double bend_m = heights_m[f - 1] - 2.0 * heights_m[f] + heights_m[f + 1];
-    accelerations.push_back(std::fabs(bend_m) * kFps * kFps);
-  }
+  std::vector<double> accelerations = VerticalPelvisAccelerations(clip, kFps);
   std::ranges::sort(accelerations);
   motion.acceleration = accelerations.back();
   motion.usual_acceleration = accelerations[accelerations.size() * 99 / 100];

@@ -3,10 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdio>
 
 #include "captured_library.h"
 #include "leg_geometry.h"
+#include "pelvis_acceleration.h"
 #include "random.h"
 #include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/terrain.h"
@@ -29,9 +31,7 @@ constexpr double kLeastClearanceM = 0.01;
 // the edge by a few millimetres.
 constexpr double kEdgeM = 0.1;
 constexpr double kOverhangM = 0.005;
-// The vertical acceleration of the pelvis is averaged over this number of frames. In captures of
-// people it is at most 9.6 m/s^2 in 99 % of all frames of a climb.
-constexpr std::size_t kAveragedFrames = 5;
+// Of the pelvis, vertical, in m/s^2. People who climb stay below 9.6 in 99 % of all frames.
 constexpr double kMaxAcceleration = 9.0;
 
 struct Walker {
@@ -246,6 +246,7 @@ class TerrainWalk : public testing::TestWithParam<Walker> {
   Library library_;
 };
 class SteppingStones : public TerrainWalk {};
+class WideStances : public TerrainWalk {};
 
 const Walker kBuiltin{"Builtin", {}};
 const Walker kSubject16{"Subject16", {"16"}};
@@ -255,6 +256,9 @@ INSTANTIATE_TEST_SUITE_P(Libraries, TerrainWalk, testing::Values(kBuiltin, kSubj
                          kName);
 INSTANTIATE_TEST_SUITE_P(Libraries, SteppingStones,
                          testing::Values(kBuiltin, kSubject16, kSubject01), kName);
+
+// The library of subject 16 rejects such wide steps sideways.
+INSTANTIATE_TEST_SUITE_P(Libraries, WideStances, testing::Values(kBuiltin, kSubject01), kName);
 
 TEST_P(SteppingStones, AreUsedOneByOne) {
   for (const unsigned seed : {1u, 2u, 3u}) {
@@ -281,25 +285,10 @@ TEST_P(TerrainWalk, WalksOverHills) {
   }
 }
 
-// Returns the largest vertical acceleration of the pelvis.
-double LargestAcceleration(const Clip& clip) {
-  const auto mean_m = [&](std::size_t first) {
-    double sum_m = 0.0;
-    for (std::size_t f = first; f < first + kAveragedFrames; ++f)
-      sum_m += clip.root_positions_m[f].y;
-    return sum_m / static_cast<double>(kAveragedFrames);
-  };
-  double largest = 0.0;
-  for (std::size_t f = 1; f + kAveragedFrames < clip.root_positions_m.size(); ++f) {
-    const double bend_m = mean_m(f - 1) - 2.0 * mean_m(f) + mean_m(f + 1);
-    largest = std::max(largest, std::fabs(bend_m) * kFps * kFps);
-  }
-  return largest;
-}
-
 // After a step sideways onto a block, the leg that stayed behind is stretched, so it keeps the body
 // down until its foot leaves the ground.
-TEST_P(TerrainWalk, ClosesWideStancesGently) {
+TEST_P(WideStances, AreClosedGently) {
+  int played = 0;  // Courses whose footprints are within reach.
   for (const double rise_m : {0.0, 0.05, 0.1}) {
     for (const double side_m : {0.45, 0.5, 0.55, 0.6}) {
       Course course;
@@ -314,11 +303,14 @@ TEST_P(TerrainWalk, ClosesWideStancesGently) {
                                          .fps = kFps,
                                          .options = {.terrain = course.ground}});
       ASSERT_TRUE(synthesis.has_value());
-      const double largest = LargestAcceleration(synthesis->clip);
+      if (synthesis->movements.size() < 2) continue;
+      ++played;
+      const double largest = std::ranges::max(VerticalPelvisAccelerations(synthesis->clip, kFps));
       std::printf("%.2f m sideways, %.2f m up: %.1f m/s^2\n", side_m, rise_m, largest);
       EXPECT_LT(largest, kMaxAcceleration) << side_m << " m sideways, " << rise_m << " m up";
     }
   }
+  EXPECT_GE(played, 10);
 }
 
 }  // namespace
