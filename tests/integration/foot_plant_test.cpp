@@ -248,8 +248,9 @@ TEST(FootprintError, ReportsHowFarAStepMissesItsFootprint) {
   EXPECT_GT(missed.landing_error_m, 1.0);
 }
 
-// The ball of this foot is so near its ankle that squares of the distance are 0 in float.
-TEST(ShortFoot, IsPlantedWithoutADirection) {
+// The ball of the right foot is so close to its ankle that the squared distance underflows to 0 in
+// float. Divisions by it must not cause NaN in planted rotations.
+TEST(ShortFoot, KeepsRotationsNormalized) {
   RawLibrary raw = MakeTestRawLibrary();
   raw.skeleton.legs[1].ball_offset_m.z = 3.1e-43f;
   LibraryBuilder builder;

@@ -47,8 +47,8 @@ struct Choice {
   bool has_layer = false;
 };
 
-// Generated steps last for multiples of 1/120 s, so frames at 60 Hz could coincide with ends of
-// movements. Rounding errors would then decide which movement a frame shows, and how many frames
+// Generated steps last for multiples of 1/120 s. At 60 Hz, frames could coincide with the ends of
+// movements, and rounding errors would decide to which movement a frame belongs and how many frames
 // there are.
 constexpr double kFps = 59.3;
 

@@ -285,8 +285,8 @@ TEST_P(TerrainWalk, WalksOverHills) {
   }
 }
 
-// After a step sideways onto a block, the leg that stayed behind is stretched, so it keeps the body
-// down until its foot leaves the ground.
+// After a wide step sideways, level or onto a block, the leg of the other foot is fully extended
+// and holds the root down until that foot is released. The root must then not spring up.
 TEST_P(WideStances, AreClosedGently) {
   int played = 0;  // Courses whose footprints are within reach.
   for (const double rise_m : {0.0, 0.05, 0.1}) {

@@ -211,9 +211,9 @@ class StepGenerator {
   [[nodiscard]] double ShareAt(double time_s) const {
     return start_share_ + (end_share_ - start_share_) * SmootherStep(time_s / end_s_);
   }
-  // Weight of the captured stride for the rotations of the root and the upper body. They shrink
-  // less than the step: if straight strides of people are shorter, the ranges of pelvis yaw, pelvis
-  // obliquity, trunk lean and arm swing are almost as large (decision 0035).
+  // Weight of the captured stride for the rotations of the root and the upper body. It decreases
+  // less than ShareAt, because people move their pelvis, trunk and arms almost as far in short
+  // strides as in long ones (decision 0035).
   [[nodiscard]] double BodyShareAt(double time_s) const {
     const double share = std::min(1.0, ShareAt(time_s));
     return share * (2.0 - share);

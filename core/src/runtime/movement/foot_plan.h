@@ -94,9 +94,9 @@ struct RootApproach {
 /// that is fully extended before its foot is released would pull the root down, and the root would
 /// spring up after the release.
 struct RootDip {
-  double depth_m = 0.0;    ///< Depth at the release; >= 0. 0: no descent.
-  double speed_m_s = 0.0;  ///< Speed of the descent at the release.
-  double over_s = 0.0;     ///< Time from the release until the root has risen again.
+  double depth_m = 0.0;    ///< Depth at the release; >= 0. 0: no dip.
+  double speed_m_s = 0.0;  ///< Downward speed at the release; >= 0. The root then sinks further.
+  double over_s = 0.0;     ///< Time from the release until the dip is 0 again.
 };
 
 /// A foot plan in the layout that the planting kernels read: groups of four floats, with positions

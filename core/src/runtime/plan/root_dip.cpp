@@ -8,16 +8,18 @@
 namespace stridewire {
 namespace {
 
-// If planting lowers the root by less than this, the root rises gently without a dip.
+// Minimum depth of a dip. If planting lowers the root by less, the root does not rise abruptly.
 constexpr double kLeastDepthM = 0.015;
 constexpr double kMaxDepthM = 0.2;
 constexpr double kMaxSpeedMPerS = 0.6;
-// The speed of the descent is measured over this time before the release.
+// The speed at the release is the mean speed during this time before it. If the movement starts
+// later, there is no dip.
 constexpr double kSpeedStepS = 1.0 / 60.0;
 // Maximum time from the release until the root has risen again.
 constexpr double kMaxRiseS = 0.35;
 
-// Returns by how much planting lowers the root at a time, so that both legs reach their targets.
+// Returns how far below its planned height planting puts the root at a time, in metres. Planting
+// lowers the root so that both legs reach their targets. Overwrites `job.pose`.
 double LoweringAt(const FootPlanJob& job, double time_s) {
   const Skeleton& skeleton = job.library.skeleton();
   const LegRig& rig = job.library.leg_rig();

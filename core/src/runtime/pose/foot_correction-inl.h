@@ -213,7 +213,8 @@ struct RootDipOf {
 };
 
 // Returns by how much a dip lowers the root: a cubic Hermite curve from 0 to the depth and speed at
-// the release, and another one back to 0.
+// the release, and another one back to 0. The speed is 0 at both ends. It is continuous at the
+// release, so the root sinks further for a short time.
 template <typename Number, typename Timing>
 STRIDEWIRE_INLINE Number DipAt(const Timing& timing, const RootDipOf<Number>& dip) {
   const Number one = Constant<Number>(1.0);

@@ -41,11 +41,13 @@ constexpr double kTiny = 1e-9;
 // Fractions of a step at which PoseChange measures the pose.
 constexpr std::array<double, 3> kVariedAt{0.25, 0.5, 0.75};
 // Maximum change of a weight relative to its value, before the effect on the parameters is removed.
-// In groups of generated steps, what then remains of the change is small. Starts and stops of a
-// walk vary less: they are rarely repeated, and toes of generated ones would sink into the ground.
+// It is large, because little of the change remains in groups of generated steps. Steps that start
+// or stop a walk have a lower limit: they are rarely repeated, and with the higher one, toes of
+// generated steps would sink into the ground.
 constexpr double kMaxRelativeChange = 12.0;
 constexpr double kMaxRelativeChangeAtStand = 3.0;
-// Steps that turn by at most this may vary in pose.
+// In groups with more than kMaxVariantParameters parameters, only steps that turn by at most this
+// vary in pose.
 constexpr double kMaxVariedTurnRad = 0.1;
 // A group of climbing steps has smaller limits on weights if it has fewer captured examples than
 // this per coefficient of the linear part.
@@ -211,9 +213,9 @@ double PoseChange(const MotionGroup& group, const GridLayout& layout,
   return std::sqrt(squares / static_cast<double>(kVariedAt.size()));
 }
 
-// Adds a change to the weights [n]. `size_rad` is the size of the change as measured by PoseChange.
-// The change is scaled to kVariedRad, or less if the limits on weights require it: at most by
-// `max_scale`, and the sum of |w| stays below `max_sum`.
+// Adds a change to the weights [n]. `size_rad` is its size as measured by PoseChange. The change is
+// scaled to kVariedRad, but at most by `max_scale`. If the sum of |w| would exceed
+// max_sum - kMargin, the change is reduced further, if necessary to 0.
 void AddVariation(std::span<const double> change, double size_rad, double max_scale, double max_sum,
                   std::span<double> weights) {
   const double scale = std::min(max_scale, kVariedRad / std::max(size_rad, kTiny));
@@ -228,10 +230,11 @@ void AddVariation(std::span<const double> change, double size_rad, double max_sc
   for (std::size_t e = 0; e < weights.size(); ++e) weights[e] += part * change[e];
 }
 
-// Returns true if a step may vary in pose. Steps that turn are rarely repeated, and their examples
-// differ so much that soles would enter the ground. If a group with more than two parameters has
-// none for the sideways position of the foot that lands, a variation would move that foot sideways,
-// and steps on the spot would leave their place.
+// Returns true if a step may vary in pose: all steps of groups with at most two parameters, which
+// are straight, and level steps of other groups that hardly turn and have a parameter for the
+// sideways position of the foot that lands. Steps that turn more are rarely repeated, and their
+// examples differ so much that soles would enter the ground. Without that parameter, a variation
+// would move the foot sideways.
 bool MayVary(const MotionGroup& group, const ParameterValues& wanted) {
   if (wanted.count <= static_cast<int>(kMaxVariantParameters)) return true;
   const int turn = group.FindParameter(ParameterName::kTurn);

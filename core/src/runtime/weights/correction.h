@@ -93,9 +93,9 @@ class CorrectionScratch {
 /// without correction. An error remains if no weights within the limit reach p^, or if the
 /// iterations do not suffice.
 ///
-/// With `variation`, these steps deviate before they are corrected: steps of groups with one or two
-/// parameters, and level steps of other groups that turn by at most 0.1 rad, if the group has a
-/// parameter for the sideways position of the foot that lands.
+/// With `variation`, the weights of some steps are changed before the correction: those of groups
+/// with one or two parameters, and of level steps of other groups that turn by at most 0.1 rad, if
+/// the group has a parameter for the sideways position of the foot that lands.
 ///
 /// - If the group has variants, the difference between one of them (see ChooseVariant) and the
 ///   blend for its parameters is added, scaled so that the pose changes by at most a fixed amount.
@@ -103,7 +103,7 @@ class CorrectionScratch {
 /// - In other groups, the weights deviate at random. The part of the deviation that changes the
 ///   parameters is removed to first order, with D as above. In generated steps that start or stop
 ///   a walk, the part that changes the keytimes is removed as well. The rest is scaled to a fixed
-///   change of the pose, or less if the limits on weights require it.
+///   change of the pose, or less if the limits on the weights and on their change require it.
 ///
 /// If the correction then leaves an error above 0.1 mm, it is repeated without variation.
 ///

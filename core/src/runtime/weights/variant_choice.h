@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-/// Groups with more parameters than this have no variants. Groups of steps with at most two
-/// parameters contain only straight steps; steps of other groups rarely have similar parameters.
+/// Groups with more parameters than this have no variants, because their captured steps rarely have
+/// similar parameters. Groups of steps with at most two parameters contain only straight steps.
 inline constexpr std::size_t kMaxVariantParameters = 2;
 
 /// A variant that a step blends (see MotionGroup).
